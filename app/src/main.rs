@@ -1,0 +1,2 @@
+//! Plait.
+fn main() {}

@@ -1,0 +1,8 @@
+//! Everything Plait computes: from a triangle mesh, over woven dual strips, to a quad layout and its files.
+//!
+//! The library knows no window and no GPU and holds no global state. Data flows one way, from mesh to layout
+//! to file: a module knows the modules before it, never those after it.
+
+pub mod mesh;
+pub mod progress;
+pub mod surface;

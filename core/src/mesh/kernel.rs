@@ -1,0 +1,479 @@
+//! The half-edge triangle mesh.
+//!
+//! Half-edge `3 f + i` runs along side `i` of face `f`, from its corner `i` to its corner `i + 1`. So face,
+//! next and previous are arithmetic, and only the origin and the twin are stored. A boundary half-edge has no
+//! twin. The mesh is an oriented manifold, checked once in [`TriMesh::from_faces`] and relied on everywhere.
+
+use std::fmt;
+
+use glam::DVec3;
+use thiserror::Error;
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// The id of the element at `index` of a flat array.
+            #[inline]
+            pub fn new(index: usize) -> Self {
+                Self(index as u32)
+            }
+
+            /// The position of this element in flat arrays.
+            #[inline]
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "{}{}", stringify!($name).trim_end_matches("Id").to_lowercase(), self.0)
+            }
+        }
+    };
+}
+
+id!(
+    /// A vertex of a [`TriMesh`].
+    VertexId
+);
+id!(
+    /// A triangle of a [`TriMesh`].
+    FaceId
+);
+id!(
+    /// A directed side of a triangle of a [`TriMesh`].
+    HalfedgeId
+);
+id!(
+    /// An undirected edge of a [`TriMesh`].
+    EdgeId
+);
+
+/// "No element" in the flat arrays of the kernel.
+const NONE: u32 = u32::MAX;
+
+/// Why a list of triangles is not an oriented manifold.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TriMeshError {
+    /// A face names a vertex that does not exist.
+    #[error("face {face} names vertex {vertex}, but there are only {count} vertices")]
+    UnknownVertex {
+        /// The face.
+        face: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// The number of vertices.
+        count: usize,
+    },
+    /// A face names one vertex twice.
+    #[error("face {face} names vertex {vertex} twice")]
+    RepeatedVertex {
+        /// The face.
+        face: usize,
+        /// The vertex.
+        vertex: u32,
+    },
+    /// Two faces run along one edge in the same direction, or more than two faces share it.
+    #[error("edge {from}-{to} is used twice in the same direction (by faces {first} and {second})")]
+    NonManifoldEdge {
+        /// Start of the directed edge.
+        from: u32,
+        /// End of the directed edge.
+        to: u32,
+        /// The first face.
+        first: usize,
+        /// The second face.
+        second: usize,
+    },
+    /// The faces at a vertex form more than one fan.
+    #[error("vertex {vertex} joins several fans of faces")]
+    NonManifoldVertex {
+        /// The vertex.
+        vertex: u32,
+    },
+    /// A vertex belongs to no face.
+    #[error("vertex {vertex} belongs to no face")]
+    UnusedVertex {
+        /// The vertex.
+        vertex: u32,
+    },
+    /// A coordinate is not a finite number.
+    #[error("vertex {vertex} has a coordinate that is not finite")]
+    NotFinite {
+        /// The vertex.
+        vertex: u32,
+    },
+}
+
+/// An oriented manifold triangle mesh with or without boundary, possibly of several components.
+#[derive(Debug, Clone)]
+pub struct TriMesh {
+    positions: Vec<DVec3>,
+    /// Origin vertex of each half-edge.
+    origin: Vec<u32>,
+    /// Twin of each half-edge, or `NONE` on the boundary.
+    twin: Vec<u32>,
+    /// Undirected edge of each half-edge.
+    edge: Vec<u32>,
+    /// One half-edge of each edge; the one with the smaller id.
+    edge_halfedge: Vec<u32>,
+    /// One outgoing half-edge of each vertex; at the boundary the first one counter-clockwise.
+    vertex_halfedge: Vec<u32>,
+}
+
+impl TriMesh {
+    /// Connects `faces` (vertex indices, counter-clockwise from outside) over `positions`.
+    ///
+    /// # Errors
+    ///
+    /// The first violation of "an oriented manifold, every vertex used, every coordinate finite".
+    pub fn from_faces(positions: Vec<DVec3>, faces: &[[u32; 3]]) -> Result<Self, TriMeshError> {
+        check_faces(&positions, faces)?;
+        let origin: Vec<u32> = faces.iter().flatten().copied().collect();
+        let twin = connect(positions.len(), &origin)?;
+
+        let mut edge = vec![NONE; origin.len()];
+        let mut edge_halfedge = Vec::with_capacity(origin.len() / 2);
+        for h in 0..origin.len() {
+            if edge[h] == NONE {
+                edge[h] = edge_halfedge.len() as u32;
+                if twin[h] != NONE {
+                    edge[twin[h] as usize] = edge[h];
+                }
+                edge_halfedge.push(h as u32);
+            }
+        }
+
+        let mut vertex_halfedge = vec![NONE; positions.len()];
+        for (h, &v) in origin.iter().enumerate() {
+            // Prefer the half-edge without twin: rotating counter-clockwise from it meets the whole fan.
+            if vertex_halfedge[v as usize] == NONE || twin[h] == NONE {
+                vertex_halfedge[v as usize] = h as u32;
+            }
+        }
+        let mesh = Self { positions, origin, twin, edge, edge_halfedge, vertex_halfedge };
+        mesh.check_fans()?;
+        Ok(mesh)
+    }
+
+    fn check_fans(&self) -> Result<(), TriMeshError> {
+        let mut degree = vec![0u32; self.n_vertices()];
+        for &v in &self.origin {
+            degree[v as usize] += 1;
+        }
+        for v in self.vertices() {
+            if degree[v.index()] == 0 {
+                return Err(TriMeshError::UnusedVertex { vertex: v.0 });
+            }
+            if self.outgoing(v).count() as u32 != degree[v.index()] {
+                return Err(TriMeshError::NonManifoldVertex { vertex: v.0 });
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Number of triangles.
+    pub fn n_faces(&self) -> usize {
+        self.origin.len() / 3
+    }
+
+    /// Number of half-edges, three per triangle.
+    pub fn n_halfedges(&self) -> usize {
+        self.origin.len()
+    }
+
+    /// Number of undirected edges.
+    pub fn n_edges(&self) -> usize {
+        self.edge_halfedge.len()
+    }
+
+    /// All vertices in order.
+    pub fn vertices(&self) -> impl DoubleEndedIterator<Item = VertexId> + use<> {
+        (0..self.n_vertices() as u32).map(VertexId)
+    }
+
+    /// All triangles in order.
+    pub fn faces(&self) -> impl DoubleEndedIterator<Item = FaceId> + use<> {
+        (0..self.n_faces() as u32).map(FaceId)
+    }
+
+    /// All edges in order.
+    pub fn edges(&self) -> impl DoubleEndedIterator<Item = EdgeId> + use<> {
+        (0..self.n_edges() as u32).map(EdgeId)
+    }
+
+    /// All half-edges in order.
+    pub fn halfedges(&self) -> impl DoubleEndedIterator<Item = HalfedgeId> + use<> {
+        (0..self.n_halfedges() as u32).map(HalfedgeId)
+    }
+
+    /// Positions of all vertices.
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+
+    /// Position of a vertex.
+    #[inline]
+    pub fn position(&self, v: VertexId) -> DVec3 {
+        self.positions[v.index()]
+    }
+
+    /// The vertex a half-edge starts at.
+    #[inline]
+    pub fn origin(&self, h: HalfedgeId) -> VertexId {
+        VertexId(self.origin[h.index()])
+    }
+
+    /// The vertex a half-edge ends at.
+    #[inline]
+    pub fn target(&self, h: HalfedgeId) -> VertexId {
+        self.origin(self.next(h))
+    }
+
+    /// The vertex of the triangle of `h` that is not on `h`.
+    #[inline]
+    pub fn opposite(&self, h: HalfedgeId) -> VertexId {
+        self.origin(self.prev(h))
+    }
+
+    /// The next half-edge around the triangle, counter-clockwise.
+    #[inline]
+    pub fn next(&self, h: HalfedgeId) -> HalfedgeId {
+        HalfedgeId(if h.0 % 3 == 2 { h.0 - 2 } else { h.0 + 1 })
+    }
+
+    /// The previous half-edge around the triangle.
+    #[inline]
+    pub fn prev(&self, h: HalfedgeId) -> HalfedgeId {
+        HalfedgeId(if h.0 % 3 == 0 { h.0 + 2 } else { h.0 - 1 })
+    }
+
+    /// The oppositely directed half-edge of the neighbouring triangle; `None` on the boundary.
+    #[inline]
+    pub fn twin(&self, h: HalfedgeId) -> Option<HalfedgeId> {
+        let t = self.twin[h.index()];
+        (t != NONE).then_some(HalfedgeId(t))
+    }
+
+    /// The triangle a half-edge belongs to.
+    #[inline]
+    pub fn face(&self, h: HalfedgeId) -> FaceId {
+        FaceId(h.0 / 3)
+    }
+
+    /// The edge a half-edge lies on.
+    #[inline]
+    pub fn edge(&self, h: HalfedgeId) -> EdgeId {
+        EdgeId(self.edge[h.index()])
+    }
+
+    /// One half-edge of an edge: the one with the smaller id, hence the only one on the boundary.
+    #[inline]
+    pub fn halfedge(&self, e: EdgeId) -> HalfedgeId {
+        HalfedgeId(self.edge_halfedge[e.index()])
+    }
+
+    /// The three half-edges of a triangle, in order.
+    #[inline]
+    pub fn face_halfedges(&self, f: FaceId) -> [HalfedgeId; 3] {
+        [0, 1, 2].map(|i| HalfedgeId(3 * f.0 + i))
+    }
+
+    /// The three corners of a triangle, in order.
+    #[inline]
+    pub fn face_vertices(&self, f: FaceId) -> [VertexId; 3] {
+        self.face_halfedges(f).map(|h| self.origin(h))
+    }
+
+    /// The two ends of an edge, in the direction of [`Self::halfedge`].
+    #[inline]
+    pub fn edge_vertices(&self, e: EdgeId) -> [VertexId; 2] {
+        let h = self.halfedge(e);
+        [self.origin(h), self.target(h)]
+    }
+
+    /// One outgoing half-edge; at a boundary vertex the one that has no twin.
+    #[inline]
+    pub fn vertex_halfedge(&self, v: VertexId) -> HalfedgeId {
+        HalfedgeId(self.vertex_halfedge[v.index()])
+    }
+
+    /// The outgoing half-edges of a vertex counter-clockwise, one per incident triangle.
+    ///
+    /// At a boundary vertex the first is the boundary half-edge; the last spoke of the fan is an *incoming*
+    /// boundary half-edge and not listed.
+    pub fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
+        let first = self.vertex_halfedge(v);
+        let mut next = Some(first);
+        std::iter::from_fn(move || {
+            let h = next?;
+            next = self.twin(self.prev(h)).filter(|&n| n != first);
+            Some(h)
+        })
+    }
+
+    /// Whether an edge has a triangle on one side only.
+    #[inline]
+    pub fn is_boundary_edge(&self, e: EdgeId) -> bool {
+        self.twin(self.halfedge(e)).is_none()
+    }
+
+    /// Whether a vertex lies on the boundary.
+    #[inline]
+    pub fn is_boundary_vertex(&self, v: VertexId) -> bool {
+        self.twin(self.vertex_halfedge(v)).is_none()
+    }
+
+    /// The vector along a half-edge.
+    #[inline]
+    pub fn vector(&self, h: HalfedgeId) -> DVec3 {
+        self.position(self.target(h)) - self.position(self.origin(h))
+    }
+
+    /// Length of an edge.
+    #[inline]
+    pub fn edge_length(&self, e: EdgeId) -> f64 {
+        self.vector(self.halfedge(e)).length()
+    }
+
+    /// Twice the area of a triangle times its unit normal.
+    #[inline]
+    pub fn face_area_vector(&self, f: FaceId) -> DVec3 {
+        let [a, b, c] = self.face_vertices(f).map(|v| self.position(v));
+        (b - a).cross(c - a)
+    }
+
+    /// Unit normal of a triangle; zero where the triangle is degenerate.
+    #[inline]
+    pub fn face_normal(&self, f: FaceId) -> DVec3 {
+        self.face_area_vector(f).normalize_or_zero()
+    }
+
+    /// Area of a triangle.
+    #[inline]
+    pub fn face_area(&self, f: FaceId) -> f64 {
+        0.5 * self.face_area_vector(f).length()
+    }
+
+    /// Interior angle of the triangle of `h` at the origin of `h`, in radians.
+    #[inline]
+    pub fn corner_angle(&self, h: HalfedgeId) -> f64 {
+        let a = self.vector(h);
+        let b = -self.vector(self.prev(h));
+        a.cross(b).length().atan2(a.dot(b))
+    }
+
+    /// Euler characteristic `V − E + F`.
+    pub fn euler_characteristic(&self) -> i64 {
+        self.n_vertices() as i64 - self.n_edges() as i64 + self.n_faces() as i64
+    }
+}
+
+fn check_faces(positions: &[DVec3], faces: &[[u32; 3]]) -> Result<(), TriMeshError> {
+    if let Some(v) = positions.iter().position(|p| !p.is_finite()) {
+        return Err(TriMeshError::NotFinite { vertex: v as u32 });
+    }
+    for (face, &[a, b, c]) in faces.iter().enumerate() {
+        for vertex in [a, b, c] {
+            if vertex as usize >= positions.len() {
+                return Err(TriMeshError::UnknownVertex { face, vertex, count: positions.len() });
+            }
+        }
+        if a == b || a == c {
+            return Err(TriMeshError::RepeatedVertex { face, vertex: a });
+        }
+        if b == c {
+            return Err(TriMeshError::RepeatedVertex { face, vertex: b });
+        }
+    }
+    Ok(())
+}
+
+/// Finds the twin of every half-edge, by sorting the half-edges at each vertex.
+fn connect(n_vertices: usize, origin: &[u32]) -> Result<Vec<u32>, TriMeshError> {
+    let target = |h: usize| origin[if h % 3 == 2 { h - 2 } else { h + 1 }];
+    let mut first = vec![0u32; n_vertices + 1];
+    for &v in origin {
+        first[v as usize + 1] += 1;
+    }
+    for v in 0..n_vertices {
+        first[v + 1] += first[v];
+    }
+    let mut fill = first.clone();
+    let mut out = vec![0u32; origin.len()];
+    for (h, &v) in origin.iter().enumerate() {
+        out[fill[v as usize] as usize] = h as u32;
+        fill[v as usize] += 1;
+    }
+    let mut twin = vec![NONE; origin.len()];
+    for h in 0..origin.len() {
+        let (a, b) = (origin[h], target(h));
+        let at = |v: u32| &out[first[v as usize] as usize..first[v as usize + 1] as usize];
+        if let Some(&g) = at(a).iter().find(|&&g| g as usize != h && target(g as usize) == b) {
+            let (first, second) = ((h / 3).min(g as usize / 3), (h / 3).max(g as usize / 3));
+            return Err(TriMeshError::NonManifoldEdge { from: a, to: b, first, second });
+        }
+        if let Some(&g) = at(b).iter().find(|&&g| target(g as usize) == a) {
+            twin[h] = g;
+        }
+    }
+    Ok(twin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron() -> TriMesh {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        TriMesh::from_faces(p.to_vec(), &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).unwrap()
+    }
+
+    #[test]
+    fn a_tetrahedron_is_closed_and_consistent() {
+        let m = tetrahedron();
+        assert_eq!((m.n_vertices(), m.n_edges(), m.n_faces()), (4, 6, 4));
+        assert_eq!(m.euler_characteristic(), 2);
+        for h in m.halfedges() {
+            let t = m.twin(h).unwrap();
+            assert_eq!(m.twin(t), Some(h));
+            assert_eq!((m.origin(t), m.target(t)), (m.target(h), m.origin(h)));
+            assert_eq!(m.edge(t), m.edge(h));
+        }
+        for v in m.vertices() {
+            assert_eq!(m.outgoing(v).count(), 3);
+            assert!(m.outgoing(v).all(|h| m.origin(h) == v));
+        }
+    }
+
+    #[test]
+    fn a_boundary_fan_starts_at_the_boundary() {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        let m = TriMesh::from_faces(p.to_vec(), &[[0, 1, 2], [0, 2, 3]]).unwrap();
+        assert!(m.vertices().all(|v| m.is_boundary_vertex(v)));
+        assert_eq!(m.outgoing(VertexId(0)).count(), 2);
+        assert_eq!(m.edges().filter(|&e| m.is_boundary_edge(e)).count(), 4);
+    }
+
+    #[test]
+    fn broken_input_is_named() {
+        let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+        let err = |f: &[[u32; 3]]| TriMesh::from_faces(p.clone(), f).unwrap_err();
+        assert!(matches!(err(&[[0, 1, 9]]), TriMeshError::UnknownVertex { vertex: 9, .. }));
+        assert!(matches!(err(&[[0, 1, 1]]), TriMeshError::RepeatedVertex { vertex: 1, .. }));
+        assert!(matches!(err(&[[0, 1, 2], [0, 1, 3]]), TriMeshError::NonManifoldEdge { .. }));
+        assert!(matches!(err(&[[0, 1, 2], [0, 3, 4]]), TriMeshError::NonManifoldVertex { vertex: 0 }));
+        assert!(matches!(err(&[[0, 1, 2]]), TriMeshError::UnusedVertex { vertex: 3 }));
+    }
+}

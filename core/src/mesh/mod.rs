@@ -4,5 +4,13 @@
 //! else of this crate.
 
 mod kernel;
+mod load;
+mod read;
+mod repair;
+mod triangulate;
+mod write;
 
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
+pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};
+pub use repair::Repair;
+pub use write::{write_mesh_obj, write_obj};

@@ -4,8 +4,11 @@
 //! to file: a module knows the modules before it, never those after it.
 
 pub mod dual;
+pub mod layout;
 pub mod mesh;
 pub mod progress;
+pub mod quad;
+pub mod solve;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;

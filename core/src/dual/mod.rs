@@ -10,4 +10,5 @@ mod slots;
 
 pub use arrangement::{Arrangement, ArrangementError, Crossing, End, Region, Segment, Side, SideKind};
 pub use assess::{Colour, Finding, RegionReport, assess};
-pub use refined::{Mark, NoRoute, RefinedMesh};
+pub(crate) use refined::Cost;
+pub use refined::{Mark, NoRoute, RefinedMesh, next, prev};

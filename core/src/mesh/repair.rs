@@ -83,11 +83,18 @@ impl fmt::Display for Repair {
                 write!(f, "dropped {} with the corners of another face (first: {first})", faces(*count))
             }
             Self::Reoriented { count, first } => {
-                write!(f, "turned round {} against their neighbours (first: {first})", one(*count, "triangle", "triangles"))
+                write!(
+                    f,
+                    "turned round {} against their neighbours (first: {first})",
+                    one(*count, "triangle", "triangles")
+                )
             }
             Self::TurnedOutwards { count, first } => {
                 let triangles = one(*count, "triangle", "triangles");
-                write!(f, "turned a closed surface of {triangles} inside out, as it faced inwards (it begins with {first})")
+                write!(
+                    f,
+                    "turned a closed surface of {triangles} inside out, as it faced inwards (it begins with {first})"
+                )
             }
             Self::SplitVertices { count, first } => {
                 write!(f, "split {} where several sheets touch in a point (first: {first})", vertices(*count))

@@ -37,7 +37,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
 /// The vertex index (from 0) of a corner written as `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 fn corner(word: &[u8], n_vertices: usize, line: usize) -> Result<u32, LoadError> {
     let digits = word.split(|&b| b == b'/').next().unwrap_or_default();
-    let written: i64 = number(digits).ok_or_else(|| syntax(line, format!("“{}” is not a corner of a face", show(word))))?;
+    let written: i64 =
+        number(digits).ok_or_else(|| syntax(line, format!("“{}” is not a corner of a face", show(word))))?;
     let index = if written < 0 { n_vertices as i64 + written } else { written - 1 };
     u32::try_from(index).map_err(|_| syntax(line, format!("there is no vertex {written} here")))
 }

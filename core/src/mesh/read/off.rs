@@ -10,7 +10,8 @@ use crate::mesh::load::LoadError;
 
 /// Whether a word is the keyword that opens an OFF file of points in space.
 pub(super) fn is_header(word: &[u8]) -> bool {
-    word.strip_suffix(b"OFF").is_some_and(|prefix| matches!(prefix, b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN"))
+    word.strip_suffix(b"OFF")
+        .is_some_and(|prefix| matches!(prefix, b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN"))
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
@@ -22,7 +23,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
         words.next();
         if words.peek().is_none() {
             rows.next();
-            let Some(&(next, content)) = rows.peek() else { return Err(syntax(line, "the file ends after its header")) };
+            let Some(&(next, content)) = rows.peek() else {
+                return Err(syntax(line, "the file ends after its header"));
+            };
             words = tokens(content).peekable();
             line = next;
         }

@@ -24,7 +24,8 @@ fn declared(bytes: &[u8]) -> Option<usize> {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
-    let is_text = !is_binary(bytes) && bytes.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    let is_text =
+        !is_binary(bytes) && bytes.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
     if is_text { read_text(bytes) } else { read_binary(bytes) }
 }
 

@@ -7,10 +7,12 @@ mod kernel;
 mod load;
 mod read;
 mod repair;
+mod topology;
 mod triangulate;
 mod write;
 
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
 pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};
 pub use repair::Repair;
+pub use topology::{Component, Topology};
 pub use write::{write_mesh_obj, write_obj};

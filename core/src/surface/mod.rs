@@ -2,6 +2,8 @@
 
 mod curve;
 mod point;
+mod relax;
 
 pub use curve::{Crossing, CurveError, SurfaceCurve};
 pub use point::SurfacePoint;
+pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};

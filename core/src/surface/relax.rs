@@ -22,7 +22,8 @@ use crate::progress::{Cancelled, Progress};
 
 use super::{CurveError, SurfaceCurve, SurfacePoint};
 use energy::Energy;
-use strip::{Side, Strip};
+use strip::Strip;
+pub(super) use strip::{Side, spokes_across};
 
 /// Penalty of a direction: triangle and unit tangent in it → `q` of (8.1), not negative.
 pub type Alignment<'a> = dyn Fn(FaceId, DVec3) -> f64 + Sync + 'a;

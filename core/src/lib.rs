@@ -3,6 +3,8 @@
 //! The library knows no window and no GPU and holds no global state. Data flows one way, from mesh to layout
 //! to file: a module knows the modules before it, never those after it.
 
+pub mod field;
 pub mod mesh;
 pub mod progress;
+pub mod solve;
 pub mod surface;

@@ -3,6 +3,7 @@
 //! The library knows no window and no GPU and holds no global state. Data flows one way, from mesh to layout
 //! to file: a module knows the modules before it, never those after it.
 
+pub mod elastica;
 pub mod mesh;
 pub mod progress;
 pub mod surface;

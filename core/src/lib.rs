@@ -4,6 +4,7 @@
 //! to file: a module knows the modules before it, never those after it.
 
 pub mod dual;
+pub mod elastica;
 pub mod field;
 pub mod layout;
 pub mod mesh;

@@ -14,3 +14,4 @@ pub mod solve;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;
+pub mod weave;

@@ -28,6 +28,8 @@ pub enum Colour {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Finding {
+    /// No strip touches this component of the surface.
+    Untouched,
     /// No strip crosses here: the region has no corner.
     NoCorner,
     /// The region has handles.
@@ -42,11 +44,15 @@ pub enum Finding {
     },
     /// The region touches the boundary of the surface in several places, or along a whole boundary loop.
     Boundary {
-        /// Number of stretches.
+        /// Number of whole boundary loops.
+        whole: usize,
+        /// Number of stretches, whole loops included.
         stretches: usize,
     },
     /// Only one patch would meet at the node, folded onto itself.
     Monogon,
+    /// Only two patches meet at the node: valid, but flat.
+    Digon,
     /// Several pronounced corners of the shape.
     SeveralCorners {
         /// How many.
@@ -64,16 +70,21 @@ pub enum Finding {
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
+            Self::Untouched => write!(f, "no strip has been placed here yet"),
             Self::NoCorner => write!(f, "no two strips cross at its border"),
             Self::Handles { handles: 1 } => write!(f, "holds a handle: a strip must go through or around it"),
             Self::Handles { handles } => write!(f, "holds {handles} handles: strips must go through or around them"),
             Self::Borders { borders: 2 } => write!(f, "is a ring: a strip must cross it"),
             Self::Borders { borders } => write!(f, "has {borders} borders: strips must join them"),
-            Self::Boundary { stretches: 1 } => write!(f, "holds a whole boundary loop: a strip must end there"),
-            Self::Boundary { stretches } => {
+            Self::Boundary { whole: 1, .. } => write!(f, "holds a whole boundary loop: a strip must end there"),
+            Self::Boundary { whole, .. } if whole > 1 => {
+                write!(f, "holds {whole} whole boundary loops: strips must end there")
+            }
+            Self::Boundary { stretches, .. } => {
                 write!(f, "touches the boundary in {stretches} places: a strip must separate them")
             }
             Self::Monogon => write!(f, "a strip crosses itself around it: a second strip must cross it"),
+            Self::Digon => write!(f, "only two patches meet here, so they are folded flat: a strip should cross"),
             Self::SeveralCorners { corners } => write!(f, "holds {corners} corners of the shape"),
             Self::Valence { valence, ideal } => {
                 write!(f, "{valence} patches meet here, its curvature asks for {ideal:.1}")
@@ -137,6 +148,9 @@ fn assess_region(
     if corners.len() > 1 {
         findings.push(Finding::SeveralCorners { corners: corners.len() });
     }
+    if !red && valence == 2 && region.boundary_stretches() == 0 {
+        findings.push(Finding::Digon);
+    }
     let flat = if region.boundary_stretches() > 0 { 2.0 } else { 4.0 };
     let ideal = flat - 2.0 * curvature / PI;
     if !red && (valence as f64 - ideal).abs() > 1.0 {
@@ -144,7 +158,7 @@ fn assess_region(
     }
     let colour = match findings.first() {
         _ if red => Colour::Red,
-        Some(Finding::SeveralCorners { .. }) => Colour::Orange,
+        Some(Finding::SeveralCorners { .. } | Finding::Digon) => Colour::Orange,
         Some(_) => Colour::Yellow,
         None => Colour::None,
     };
@@ -156,6 +170,9 @@ fn assess_region(
 fn red_findings(region: &Region) -> Vec<Finding> {
     let mut findings = Vec::new();
     let borders = region.borders.len();
+    if region.borders.iter().flatten().all(|s| s.kind == SideKind::Boundary) {
+        findings.push(Finding::Untouched);
+    }
     // χ = 2 − 2 g − b for the open region, its borders counted whether curve or boundary.
     let handles = (2 - borders as i64 - region.euler) / 2;
     if handles > 0 {
@@ -164,8 +181,9 @@ fn red_findings(region: &Region) -> Vec<Finding> {
     let whole_loops = region.borders.iter().filter(|b| b.len() == 1 && b[0].kind == SideKind::Boundary).count();
     let stretches = region.boundary_stretches();
     if whole_loops > 0 || stretches > 1 {
-        findings.push(Finding::Boundary { stretches });
+        findings.push(Finding::Boundary { whole: whole_loops, stretches });
     }
+    // Handles and boundary loops are borders' causes of their own; what is left is borders of curves.
     if borders > 1 {
         findings.push(Finding::Borders { borders });
     }

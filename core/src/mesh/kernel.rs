@@ -256,7 +256,7 @@ impl TriMesh {
     /// The previous half-edge around the triangle.
     #[inline]
     pub fn prev(&self, h: HalfedgeId) -> HalfedgeId {
-        HalfedgeId(if h.0 % 3 == 0 { h.0 + 2 } else { h.0 - 1 })
+        HalfedgeId(if h.0.is_multiple_of(3) { h.0 + 2 } else { h.0 - 1 })
     }
 
     /// The oppositely directed half-edge of the neighbouring triangle; `None` on the boundary.

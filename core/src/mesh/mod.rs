@@ -3,6 +3,7 @@
 //! The room for everything that is known of a surface before any geometry processing. It may use nothing
 //! else of this crate.
 
+mod builtin;
 mod features;
 mod kernel;
 mod load;
@@ -12,6 +13,7 @@ mod topology;
 mod triangulate;
 mod write;
 
+pub use builtin::{builtin, builtin_names};
 pub use features::{SHARP_DIHEDRAL, sharp_edges};
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
 pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};

@@ -87,9 +87,7 @@ fn clip_ears(outline: &mut Vec<u32>, positions: &[DVec3], edges: &mut Edges, fac
         let mut best = best_of(&score);
         if score[best] <= 0.0 {
             // Cutting ears elsewhere may have freed others.
-            for i in 0..n {
-                score[i] = ear_score(&flat, outline, edges, i);
-            }
+            score = (0..n).map(|i| ear_score(&flat, outline, edges, i)).collect();
             best = best_of(&score);
         }
         let (a, b, c) = (outline[(best + n - 1) % n], outline[best], outline[(best + 1) % n]);
@@ -159,8 +157,8 @@ mod tests {
     use super::*;
 
     fn raw(positions: &[[f64; 2]], polygons: &[&[u32]]) -> RawMesh {
-        let mut raw = RawMesh::default();
-        raw.positions = positions.iter().map(|p| DVec3::new(p[0], p[1], 0.0)).collect();
+        let positions = positions.iter().map(|p| DVec3::new(p[0], p[1], 0.0)).collect();
+        let mut raw = RawMesh { positions, ..RawMesh::default() };
         for polygon in polygons {
             raw.corners.extend_from_slice(polygon);
             raw.ends.push(raw.corners.len() as u32);

@@ -171,7 +171,34 @@ impl Arrangement {
             curve.check(base).map_err(|source| ArrangementError::Curve { curve: i, source })?;
             inserter.insert(curve, i as u32).map_err(|source| ArrangementError::Draw { curve: i, source })?;
         }
-        Self::read(inserter.refined, base.n_vertices())
+        let this = Self::read(inserter.refined, base.n_vertices())?;
+        match this.with_inner_vertices() {
+            Some(refined) => Self::read(refined, base.n_vertices()),
+            None => Ok(this),
+        }
+    }
+
+    /// The refined mesh with the segments and boundary stretches split that are single edges, if there are
+    /// any: afterwards every one has an inner vertex.
+    fn with_inner_vertices(&self) -> Option<RefinedMesh> {
+        let single = |halfedges: &[u32]| match *halfedges {
+            [h] => Some((self.refined.origin(h), self.refined.target(h))),
+            _ => None,
+        };
+        let stretches = self.regions.iter().flat_map(|r| &r.borders).flatten();
+        let stretches = stretches.filter(|s| s.kind == SideKind::Boundary).map(|s| &s.halfedges);
+        let segments = self.segments.iter().map(|s| &s.halfedges);
+        let short: Vec<(u32, u32)> = segments.chain(stretches).filter_map(|list| single(list)).collect();
+        if short.is_empty() {
+            return None;
+        }
+        let mut refined = self.refined.clone();
+        for (a, b) in short {
+            if let Some(h) = refined.find(a, b) {
+                refined.split_edge(h, 0.5);
+            }
+        }
+        Some(refined)
     }
 
     /// Reads the arrangement off a mesh with marked edges.
@@ -259,6 +286,11 @@ impl Arrangement {
     }
 
     fn find_regions(&mut self) {
+        let mut scratch = Scratch {
+            on_border: vec![false; self.refined.n_vertices()],
+            counted: vec![false; self.refined.n_vertices()],
+            traced: vec![false; 3 * self.refined.n_faces()],
+        };
         for seed in 0..self.refined.n_faces() as u32 {
             if self.region_of_face[seed as usize] != NONE {
                 continue;
@@ -278,31 +310,40 @@ impl Arrangement {
                 i += 1;
             }
             faces.sort_unstable();
-            let region = self.describe_region(faces);
+            let region = self.describe_region(faces, &mut scratch);
             self.regions.push(region);
         }
     }
 
-    fn describe_region(&self, faces: Vec<u32>) -> Region {
+    fn describe_region(&self, faces: Vec<u32>, scratch: &mut Scratch) -> Region {
         let inner = |h: u32| self.refined.mark(h) == Mark::Free && !self.refined.is_boundary(h);
+        let halfedges = || faces.iter().flat_map(|f| 3 * f..3 * f + 3);
         let mut inner_halfedges = 0i64;
         let mut borders = Vec::new();
-        let mut seen = std::collections::HashSet::new();
-        let mut corners_at: std::collections::BTreeMap<u32, bool> = std::collections::BTreeMap::new();
-        for h in faces.iter().flat_map(|f| 3 * f..3 * f + 3) {
-            let free = inner(h);
-            inner_halfedges += i64::from(free);
-            *corners_at.entry(self.refined.origin(h)).or_insert(true) &= free;
-            *corners_at.entry(self.refined.target(h)).or_insert(true) &= free;
-            if !free && !seen.contains(&h) {
+        for h in halfedges() {
+            if inner(h) {
+                inner_halfedges += 1;
+                continue;
+            }
+            // Every fan of the region at a vertex on its border is bounded by border half-edges.
+            scratch.on_border[self.refined.origin(h) as usize] = true;
+            scratch.on_border[self.refined.target(h) as usize] = true;
+            if !scratch.traced[h as usize] {
                 let cycle = self.border_from(h);
-                seen.extend(cycle.iter().copied());
+                for &g in &cycle {
+                    scratch.traced[g as usize] = true;
+                }
                 borders.push(self.split_border(&cycle));
             }
         }
-        // A vertex of a crossing may touch the region with one fan that has no marked side in it: it is
-        // on a curve all the same, and every such fan is bounded by marked edges, so `free` caught it.
-        let inner_vertices = corners_at.values().filter(|&&free| free).count() as i64;
+        let mut inner_vertices = 0;
+        for h in halfedges() {
+            let v = self.refined.origin(h) as usize;
+            if !scratch.on_border[v] && !scratch.counted[v] {
+                scratch.counted[v] = true;
+                inner_vertices += 1;
+            }
+        }
         let euler = faces.len() as i64 - inner_halfedges / 2 + inner_vertices;
         Region { faces, borders, euler }
     }
@@ -367,6 +408,13 @@ impl Arrangement {
     pub fn crossing_index(&self, v: u32) -> Option<usize> {
         self.crossings.binary_search_by_key(&v, |c| c.vertex).ok()
     }
+}
+
+/// Marks that describing all regions shares: a vertex off all borders belongs to one region only.
+struct Scratch {
+    on_border: Vec<bool>,
+    counted: Vec<bool>,
+    traced: Vec<bool>,
 }
 
 /// All vertices where curves cross or end.

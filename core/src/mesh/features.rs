@@ -33,8 +33,7 @@ pub fn sharp_edges(mesh: &TriMesh, dihedral: f64) -> Vec<bool> {
 fn carried_normals(mesh: &TriMesh) -> Vec<DVec3> {
     let carrier: Vec<FaceId> = mesh.faces().map(|f| carrier(mesh, f)).collect();
     let normal = |mut f: FaceId| {
-        // Thin faces may lie against each other in a ring: as many steps as there are faces lead out or never will.
-        // Chains are short in practice, so a small bound serves.
+        // Chains of thin faces are short; thin faces that lie against each other in a ring have no end.
         const STEPS: usize = 64;
         for _ in 0..STEPS {
             if carrier[f.index()] == f {

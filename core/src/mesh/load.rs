@@ -100,6 +100,9 @@ pub enum LoadError {
     /// The file cannot be read.
     #[error("{0}")]
     Io(#[from] std::io::Error),
+    /// A folder, a pipe or a device.
+    #[error("this is not a regular file")]
+    NotAFile,
     /// There is nothing in the file.
     #[error("the file is empty")]
     Empty,
@@ -186,6 +189,10 @@ pub enum LoadError {
 /// The file cannot be read, or its content is refused; see [`LoadError`].
 pub fn load(path: &Path) -> Result<LoadedMesh, LoadError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    // Reading a pipe or a device might never end.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(LoadError::NotAFile);
+    }
     parse(&std::fs::read(path)?, &name)
 }
 
@@ -268,6 +275,7 @@ mod tests {
         assert!(matches!(parse(b"", "a.obj"), Err(LoadError::Empty)));
         assert!(matches!(parse(b" \n\n", "a.stl"), Err(LoadError::Empty)));
         assert!(matches!(parse(b"hello world", "a.txt"), Err(LoadError::UnknownFormat)));
+        assert!(matches!(load(Path::new(env!("CARGO_MANIFEST_DIR"))), Err(LoadError::NotAFile)));
         assert!(matches!(load(Path::new("/nowhere/at/all.obj")), Err(LoadError::Io(_))));
     }
 

@@ -275,13 +275,12 @@ impl Work {
         for (i, component) in components.iter().enumerate() {
             let n = component.len();
             let against = component.iter().filter(|&&(_, turned)| turned).count();
-            // A closed surface inside another may bound a cavity and then faces inwards by right.
-            let is_outer = boxes[i].is_some_and(|inner| {
-                let inside = |outer: &[DVec3; 2]| outer[0].cmplt(inner[0]).all() && outer[1].cmpgt(inner[1]).all();
-                !boxes.iter().flatten().any(inside)
-            });
-            let volume = if is_outer { self.volume(component) } else { 0.0 };
-            let all = if volume == 0.0 { 2 * against > n } else { volume < 0.0 };
+            let volume = if boxes[i].is_some() { self.volume(component) } else { 0.0 };
+            let all = if volume == 0.0 || (volume < 0.0 || against > 0) && is_enclosed(&boxes, i) {
+                2 * against > n
+            } else {
+                volume < 0.0
+            };
             let turned = |&&(f, turned): &&(u32, bool)| (turned != all).then_some(f as usize);
             if against == 0 && all {
                 let first = component.iter().map(|&(f, _)| f as usize).min().unwrap_or(0);
@@ -418,6 +417,15 @@ impl Work {
             *v = renamed[*v as usize];
         }
     }
+}
+
+/// Whether the box of a closed component lies inside that of another: it may bound a cavity of that one and then
+/// faces inwards by right.
+fn is_enclosed(boxes: &[Option<[DVec3; 2]>], component: usize) -> bool {
+    boxes[component].is_some_and(|inner| {
+        let encloses = |outer: &[DVec3; 2]| outer[0].cmplt(inner[0]).all() && outer[1].cmpgt(inner[1]).all();
+        boxes.iter().flatten().any(encloses)
+    })
 }
 
 /// Corners of triangles, united to the fans they form around their vertices.

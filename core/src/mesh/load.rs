@@ -371,14 +371,21 @@ mod tests {
         }
 
         #[test]
-        fn truncated_files_never_panic(file in 0usize..64, at in 0.0f64..1.0) {
+        fn truncated_and_damaged_files_never_panic(
+            file in 0usize..64, at in 0.0f64..1.0, damage in prop::collection::vec((0.0f64..1.0, any::<u8>()), 0..4),
+        ) {
             if let Some(folder) = meshes() {
                 let rows = manifest(&folder);
                 let file = &rows[file % rows.len()].0;
+                let mut bytes = std::fs::read(folder.join(file)).unwrap();
                 // The smallest files are enough, and fast.
-                let bytes = std::fs::read(folder.join(file)).unwrap();
                 if bytes.len() < 200_000 {
-                    let _ = parse(&bytes[..(at * bytes.len() as f64) as usize], file);
+                    bytes.truncate((at * bytes.len() as f64) as usize);
+                    for (place, byte) in damage {
+                        let place = (place * bytes.len() as f64) as usize;
+                        bytes.get_mut(place).into_iter().for_each(|b| *b = byte);
+                    }
+                    let _ = parse(&bytes, file);
                 }
             }
         }

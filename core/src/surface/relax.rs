@@ -191,7 +191,7 @@ pub fn relax(
     for _ in 0..options.rounds {
         progress.check()?;
         let pushes = original.slide(mesh, options, &mut strip, STEPS, &mut best);
-        let now = pass_vertices(mesh, options, &mut strip, &pushes, &mut passes);
+        let now = pass_vertices(mesh, options, &original, &mut strip, &pushes, &mut passes);
         passed += now;
         if now == 0 {
             break;
@@ -259,6 +259,7 @@ fn pushed_vertices(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &Strip, pu
 fn pass_vertices(
     mesh: &TriMesh,
     options: &RelaxOptions<'_>,
+    original: &Original,
     strip: &mut Strip,
     pushes: &[f64],
     passes: &mut HashMap<VertexId, u8>,
@@ -269,7 +270,7 @@ fn pass_vertices(
         if passes.get(&v).is_some_and(|&n| n >= PASSES) {
             continue;
         }
-        let Some(run) = strip.run(mesh, i, side) else { continue };
+        let Some(run) = strip.run(mesh, i, side).filter(|_| original.embraces(mesh, strip, i, side)) else { continue };
         let (swept, total) = strip.sweep(mesh, run, side);
         // A run that sweeps less than half of the fan would give way to a longer one.
         if swept < 0.5 * total {

@@ -103,7 +103,7 @@ impl Original {
         let mut count = 0;
         for (v, side) in pushed_vertices(mesh, options, strip, pushes) {
             let Some(i) = (0..strip.len()).find(|&i| strip.end(mesh, i, side) == v) else { continue };
-            let Some(run) = strip.run(mesh, i, side) else { continue };
+            let Some(run) = strip.run(mesh, i, side).filter(|_| self.embraces(mesh, strip, i, side)) else { continue };
             let Some((mut now, first)) = strip.window(mesh, run, REACH) else { continue };
             let length = now.len();
             let inner = (run.0 + strip.len() - first) % strip.len();
@@ -163,6 +163,12 @@ impl Original {
         (best.1, best.2, best.3)
     }
 
+    /// Whether the vertex on one side of crossing `i` lies in the tube.
+    pub fn embraces(&self, mesh: &TriMesh, strip: &Strip, i: usize, side: Side) -> bool {
+        let p = mesh.position(strip.end(mesh, i, side));
+        self.nearest(p, strip.nodes[i].reference).0.distance(p) <= self.radius
+    }
+
     /// The energy of a strip, with the pull back to here; renews the references of its crossings.
     fn energy<'a>(&self, mesh: &'a TriMesh, options: &'a RelaxOptions<'a>, strip: &mut Strip) -> Energy<'a> {
         let points: Vec<DVec3> = (0..strip.len()).map(|i| strip.point(mesh, i)).collect();
@@ -173,20 +179,16 @@ impl Original {
             let here = lengths.get(i).copied().unwrap_or(0.0);
             let back = if strip.closed || i > 0 { lengths[strip.before(i)] } else { 0.0 };
             let [right, left] = [Side::Right, Side::Left].map(|s| mesh.position(strip.end(mesh, i, s)));
-            // Distance across the original: squared, a polynomial of the parameter.
+            // Squared distances are polynomials of the parameter. Only what is across the original is pulled back.
             let tangent = along.normalize_or_zero();
             let across = |v: DVec3| v - tangent * v.dot(tangent);
-            let (c, d) = (across(right - foot), across(left - right));
-            let square = [c.length_squared(), 2.0 * c.dot(d), d.length_squared()];
+            let square = |c: DVec3, d: DVec3| [c.length_squared(), 2.0 * c.dot(d), d.length_squared()];
+            let away = square(right - foot, left - right);
             let node = &mut strip.nodes[i];
             node.reference = reference;
             let weight = options.fidelity * 0.5 * (here + back) / (self.radius * self.radius);
-            fidelity.push(square.map(|x| weight * x));
-            bounds.push(if node.held.is_some() {
-                (node.t, node.t)
-            } else {
-                self.bounds(square, node.t, options.t_min)
-            });
+            fidelity.push(square(across(right - foot), across(left - right)).map(|x| weight * x));
+            bounds.push(if node.held.is_some() { (node.t, node.t) } else { self.bounds(away, node.t, options.t_min) });
         }
         Energy::new(mesh, options, strip, fidelity, bounds)
     }

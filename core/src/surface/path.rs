@@ -117,25 +117,20 @@ pub fn geodesic_in(
     }
     let mut strip = midpoint_strip(mesh, start, end, &allowed)?;
     // Each pass shortens the path, so it ends by itself; the bound is for rounding.
-    for _ in 0..20 * strip.len() + 100 {
+    let mut passes = 20 * strip.len() + 100;
+    loop {
         trim(mesh, start, end, &mut strip);
         if strip.is_empty() {
             // One triangle holds both ends.
-            break;
+            return Some(VertexPath { start, end, crossings: Vec::new() });
         }
         let unfolded = Unfolded::new(mesh, &strip);
         let corners = unfolded.pull();
-        if !pass_one(mesh, &mut strip, &unfolded, &corners, &allowed) {
-            let crossings = unfolded.crossings(&strip, &corners);
-            return Some(VertexPath { start, end, crossings });
+        if passes == 0 || !pass_one(mesh, &mut strip, &unfolded, &corners, &allowed) {
+            return Some(VertexPath { start, end, crossings: unfolded.crossings(&strip, &corners) });
         }
+        passes -= 1;
     }
-    if strip.is_empty() {
-        return Some(VertexPath { start, end, crossings: Vec::new() });
-    }
-    let unfolded = Unfolded::new(mesh, &strip);
-    let crossings = unfolded.crossings(&strip, &unfolded.pull());
-    Some(VertexPath { start, end, crossings })
 }
 
 /// Whether an edge at an allowed triangle joins two vertices.

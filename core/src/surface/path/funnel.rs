@@ -128,13 +128,7 @@ impl Unfolded {
             }
             let (r, l) = (self.right[i], self.left[i]);
             let t = match corners.get(next) {
-                Some(c) if c.first <= i => {
-                    if c.side == Side::Left {
-                        1.0
-                    } else {
-                        0.0
-                    }
-                }
+                Some(c) if c.first <= i => f64::from(c.side == Side::Left),
                 other => {
                     let to = other.map_or(self.end, |c| c.point);
                     let (a, b) = ((to - from).perp_dot(r - from), (to - from).perp_dot(l - from));

@@ -7,4 +7,5 @@ pub mod field;
 pub mod mesh;
 pub mod progress;
 pub mod solve;
+pub mod strip;
 pub mod surface;

@@ -79,11 +79,7 @@ pub fn interpolate(
 }
 
 /// The representation vectors of the triangles at `edges`: the direction of the edge, or the average of several.
-pub(super) fn along_edges(
-    mesh: &TriMesh,
-    metric: &Metric,
-    edges: impl Iterator<Item = EdgeId>,
-) -> Vec<Option<c64>> {
+pub(super) fn along_edges(mesh: &TriMesh, metric: &Metric, edges: impl Iterator<Item = EdgeId>) -> Vec<Option<c64>> {
     let mut sum: Vec<Option<c64>> = vec![None; mesh.n_faces()];
     for e in edges {
         let h = mesh.halfedge(e);

@@ -37,9 +37,7 @@ fn turn(metric: &Metric, mesh: &TriMesh, angle: &[f64], h: HalfedgeId, twin: Hal
 
 /// What the turn across `h` is beyond the jump, in `(-π, π]`; zero on the boundary.
 pub(super) fn rest(metric: &Metric, mesh: &TriMesh, angle: &[f64], jump: &[i8], h: HalfedgeId) -> f64 {
-    mesh.twin(h).map_or(0.0, |t| {
-        wrap(turn(metric, mesh, angle, h, t) - f64::from(across(mesh, jump, h)) * FRAC_PI_2)
-    })
+    mesh.twin(h).map_or(0.0, |t| wrap(turn(metric, mesh, angle, h, t) - f64::from(across(mesh, jump, h)) * FRAC_PI_2))
 }
 
 /// The jump across `h`, from its triangle to that of its twin.

@@ -37,10 +37,7 @@ impl Metric {
             *l += grow;
         }
         let layout: Vec<[DVec2; 3]> = mesh.faces().map(|f| lay_out(sides(&length, f))).collect();
-        let direction = mesh
-            .halfedges()
-            .map(|h| side(&layout[h.index() / 3], h.index() % 3).to_angle())
-            .collect();
+        let direction = mesh.halfedges().map(|h| side(&layout[h.index() / 3], h.index() % 3).to_angle()).collect();
         Self { layout, direction }
     }
 

@@ -113,8 +113,10 @@ fn assemble(
 
 /// For each triangle, whether its component has a fixed or a pulled triangle.
 fn held_components(mesh: &TriMesh, hard: &[Option<c64>], pull: &Pull) -> Vec<bool> {
-    let mut held: Vec<bool> =
-        mesh.faces().map(|f| hard[f.index()].is_some() || pull.weight.get(f.index()).is_some_and(|&w| w > 0.0)).collect();
+    let mut held: Vec<bool> = mesh
+        .faces()
+        .map(|f| hard[f.index()].is_some() || pull.weight.get(f.index()).is_some_and(|&w| w > 0.0))
+        .collect();
     let mut stack: Vec<FaceId> = mesh.faces().filter(|f| held[f.index()]).collect();
     while let Some(f) = stack.pop() {
         for t in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)) {
@@ -141,8 +143,7 @@ fn inverse_iteration(
     let mut x: Vec<c64> = (0..rhs.len()).map(|i| c64::from_polar(1.0, 2.399_963 * (i + 1) as f64)).collect();
     for _ in 0..ITERATIONS {
         progress.check()?;
-        let b: Vec<c64> =
-            (0..rhs.len()).map(|i| if loose[i] { x[i] * mass[i] } else { rhs[i] }).collect();
+        let b: Vec<c64> = (0..rhs.len()).map(|i| if loose[i] { x[i] * mass[i] } else { rhs[i] }).collect();
         x = factor.solve(matrix, &b)?;
         let size = (0..x.len()).filter(|&i| loose[i]).map(|i| x[i].norm()).fold(f64::MIN_POSITIVE, f64::max);
         for i in (0..x.len()).filter(|&i| loose[i]) {

@@ -251,8 +251,7 @@ mod tests {
 
     #[test]
     fn redundant_constraints_are_dropped_and_conflicts_named() {
-        let mut list =
-            vec![constraint(&[(0, 1.0), (1, -1.0)], 1.0), constraint(&[(1, 1.0), (2, -1.0)], 1.0)];
+        let mut list = vec![constraint(&[(0, 1.0), (1, -1.0)], 1.0), constraint(&[(1, 1.0), (2, -1.0)], 1.0)];
         list.push(constraint(&[(0, 1.0), (2, -1.0)], 2.0));
         let r = eliminate(&[1; 3], &list).unwrap();
         assert_eq!(r.n_free(), 1);

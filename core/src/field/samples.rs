@@ -6,12 +6,12 @@ use glam::DVec3;
 
 use crate::mesh::{EdgeId, TriMesh};
 
-/// A torus of `n` steps around and `m` steps across; vertex `(i, j)` is number `i m + j`.
+/// A thin torus (on a fat one the smoothest field has singularities) of `n` steps around and `m` steps across; vertex `(i, j)` is number `i m + j`.
 pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
     let at = |i: u32, j: u32| {
         let (a, b) = (turn(i, n), turn(j, m));
-        let r = 0.35 + 0.13 * b.cos();
-        DVec3::new(r * a.cos(), r * a.sin(), 0.13 * b.sin())
+        let r = 0.4 + 0.06 * b.cos();
+        DVec3::new(r * a.cos(), r * a.sin(), 0.06 * b.sin())
     };
     let positions = (0..n * m).map(|k| at(k / m, k % m)).collect();
     let quads = (0..n * m).map(|k| {

@@ -136,6 +136,7 @@ fn conquer_side(
     for (f, lift) in seeds {
         push(&mut queue, &mut lifts, 0.0, f, lift);
     }
+    let n_seeds = lifts.len();
     while let Some(Reverse((bits, f, at))) = queue.pop() {
         let (key, lift) = (f64::from_bits(bits), lifts[at]);
         if key >= bound {
@@ -144,7 +145,7 @@ fn conquer_side(
         let family = lift.branch.rem_euclid(2) as usize;
         let d = g.uv[f.index()].map(|w| lift.distance(w));
         // A front that has come around to the other side of its curve ends there.
-        let inside = d.iter().sum::<f64>() > 0.0 || key == 0.0;
+        let inside = at < n_seeds || d.iter().sum::<f64>() > 0.0;
         if visited[f.index()][family] || closed[f.index()] || !inside {
             continue;
         }

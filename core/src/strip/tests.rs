@@ -26,7 +26,7 @@ fn meridian_and_equator_of_a_torus_are_isolines() {
     let mesh = torus(24, 12);
     let mut curves = Vec::new();
     mark(&mesh, &mut curves, 0, |p| p.x > 0.0 && p.y.abs() < 1e-9);
-    mark(&mesh, &mut curves, 1, |p| (p.truncate().length() - 0.48).abs() < 1e-9);
+    mark(&mesh, &mut curves, 1, |p| (p.truncate().length() - 0.46).abs() < 1e-9);
     let map = map(&mesh, &curves);
     assert!(map.residual < 1e-9);
     check_seamless(&mesh, &map);
@@ -59,6 +59,16 @@ fn three_great_circles_of_a_sphere() {
     }
     let flipped = map.flipped.iter().filter(|&&f| f).count();
     assert!(flipped * 50 < mesh.n_faces(), "{flipped} of {}", mesh.n_faces());
+    let mut hist = std::collections::BTreeMap::new();
+    for f in mesh.faces() {
+        let [a, b, c] = map.uv[f.index()];
+        let k = ((b - a).perp_dot(c - a) * 0.5 / mesh.face_area(f) * 10.0) as i32;
+        *hist.entry(k).or_insert(0) += 1;
+    }
+    println!("{hist:?} flipped {flipped} of {} {:?}", mesh.n_faces(), map.strips);
+    for s in &map.field.singularities {
+        println!("{:?} {:?}", s, mesh.position(s.vertex) / 0.3);
+    }
     // By symmetry all strips are alike on both sides, and end at the singularities.
     for s in &map.strips {
         for b in s.bounds {

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::curves::{EdgePath, Step};
+use super::curves::{EdgePath, left_fan};
 use super::metric::Metric;
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh};
 
@@ -53,9 +53,9 @@ fn set_across(mesh: &TriMesh, jump: &mut [i8], h: HalfedgeId, value: i32) {
     jump[e.index()] = small(if mesh.halfedge(e) == h { value } else { -value });
 }
 
-/// The branch of the cross in the triangle of `h` that is nearest to `h`.
-pub(super) fn branch_along(metric: &Metric, angle: &[f64], h: HalfedgeId) -> i32 {
-    quarter(((metric.direction(h) - angle[h.index() / 3]) / FRAC_PI_2).round() as i32)
+/// The branch of the cross in the triangle of `h` that is nearest to the direction `lean` counter-clockwise of `h`.
+pub(super) fn branch_along(metric: &Metric, angle: &[f64], h: HalfedgeId, lean: f64) -> i32 {
+    quarter(((metric.direction(h) + lean - angle[h.index() / 3]) / FRAC_PI_2).round() as i32)
 }
 
 /// The jumps of smallest rotation.
@@ -72,21 +72,32 @@ pub(super) fn principal(mesh: &TriMesh, metric: &Metric, angle: &[f64]) -> Vec<i
 pub(super) fn keep_on_branch(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &mut [i8], paths: &[EdgePath]) {
     let mut on_path = vec![false; mesh.n_edges()];
     let mut busy = vec![false; mesh.n_vertices()];
-    for step in paths.iter().flat_map(|p| &p.steps) {
-        on_path[step.edge.index()] = true;
-        busy[step.from(mesh).index()] = true;
-        busy[step.to(mesh).index()] = true;
-        if let (Some(l), Some(r)) = (step.left(mesh), step.right(mesh)) {
-            let value = branch_along(metric, angle, l) - (branch_along(metric, angle, r) + 2);
-            set_across(mesh, jump, l, value);
+    for path in paths {
+        for (step, &lean) in path.steps.iter().zip(&path.lean) {
+            on_path[step.edge.index()] = true;
+            busy[step.from(mesh).index()] = true;
+            busy[step.to(mesh).index()] = true;
+            if let (Some(l), Some(r)) = (step.left(mesh), step.right(mesh)) {
+                let value = branch_along(metric, angle, l, lean) - (branch_along(metric, angle, r, lean) + 2);
+                set_across(mesh, jump, l, value);
+            }
         }
     }
     for _ in 0..ROUNDS {
         let mut changed = false;
         for path in paths {
-            for (a, b) in pairs(path) {
-                for (a, b) in [(a, b), (b.reversed(), a.reversed())] {
-                    changed |= mend(mesh, metric, angle, jump, (a, b), &on_path, &busy);
+            for (a, b) in path.pairs() {
+                let (from, to) = (path.steps[a], path.steps[b]);
+                for (a, b) in [
+                    ((from, path.lean[a]), (to, path.lean[b])),
+                    ((to.reversed(), path.lean[b]), (from.reversed(), path.lean[a])),
+                ] {
+                    let (Some(fan), Some(ha), Some(hb)) = (left_fan(mesh, a.0, b.0), a.0.left(mesh), b.0.left(mesh))
+                    else {
+                        continue;
+                    };
+                    let lack = branch_along(metric, angle, hb, b.1) - branch_along(metric, angle, ha, a.1);
+                    changed |= mend(mesh, metric, angle, jump, &fan, lack, &on_path, &busy);
                 }
             }
         }
@@ -96,30 +107,23 @@ pub(super) fn keep_on_branch(mesh: &TriMesh, metric: &Metric, angle: &[f64], jum
     }
 }
 
-/// Consecutive steps of a path.
-fn pairs(path: &EdgePath) -> impl Iterator<Item = (Step, Step)> + '_ {
-    let n = path.steps.len();
-    (usize::from(!path.closed)..n).map(move |i| (path.steps[(i + n - 1) % n], path.steps[i]))
-}
-
-/// Mends the fan left of two consecutive steps; says whether anything was changed.
+/// Changes jumps of a fan until they sum to `want`; says whether that was needed.
+#[allow(clippy::too_many_arguments)]
 fn mend(
     mesh: &TriMesh,
     metric: &Metric,
     angle: &[f64],
     jump: &mut [i8],
-    (a, b): (Step, Step),
+    fan: &[HalfedgeId],
+    want: i32,
     on_path: &[bool],
     busy: &[bool],
 ) -> bool {
-    let Some(fan) = left_fan(mesh, a, b) else { return false };
-    let (Some(ha), Some(hb)) = (a.left(mesh), b.left(mesh)) else { return false };
-    if fan.is_empty() {
+    let sum: i32 = fan.iter().map(|&h| across(mesh, jump, h)).sum();
+    let mut lack = small(want - sum);
+    if fan.is_empty() || lack == 0 {
         return false;
     }
-    let sum: i32 = fan.iter().map(|&h| across(mesh, jump, h)).sum();
-    let mut lack = small(branch_along(metric, angle, hb) - sum - branch_along(metric, angle, ha));
-    let changed = lack != 0;
     while lack != 0 {
         let sign = i32::from(lack.signum());
         // Not another path, rather not an edge to another path's vertex, then the largest turn of the right sign.
@@ -138,21 +142,5 @@ fn mend(
         set_across(mesh, jump, best, value);
         lack -= sign as i8;
     }
-    changed
-}
-
-/// The half-edges crossed counter-clockwise around the vertex between two steps, from the triangle left of the
-/// second to the triangle left of the first; `None` if the boundary is in between.
-fn left_fan(mesh: &TriMesh, a: Step, b: Step) -> Option<Vec<HalfedgeId>> {
-    let end = a.left(mesh)?;
-    let mut h = b.left(mesh)?;
-    let mut fan = Vec::new();
-    loop {
-        let spoke = mesh.prev(h);
-        if spoke == end {
-            return Some(fan);
-        }
-        fan.push(spoke);
-        h = mesh.twin(spoke)?;
-    }
+    true
 }

@@ -35,7 +35,7 @@ fn a_loop_on_a_torus_and_a_circle_on_a_ring_need_no_singularities() {
     let mut circle = Vec::new();
     mark(&ring, &mut circle, 7, |p| (p.length() - 0.35).abs() < 1e-9);
     for (mesh, curves, steps) in [(torus, curves, 12), (ring, circle, 40)] {
-        let paths = trace_curves(&mesh, &curves).unwrap();
+        let paths = trace_curves(&mesh, &Metric::new(&mesh), &curves).unwrap();
         assert_eq!((paths.len(), paths[0].closed, paths[0].steps.len()), (1, true, steps));
         let metric = Metric::new(&mesh);
         let field = interpolate(&mesh, &metric, &paths, &[], &Progress::new()).unwrap();
@@ -43,7 +43,7 @@ fn a_loop_on_a_torus_and_a_circle_on_a_ring_need_no_singularities() {
         for s in &paths[0].steps {
             let h = s.left(&mesh).unwrap();
             let along = mesh.vector(h).normalize();
-            let best = field.direction(&mesh, &metric, mesh.face(h), field.branch_along(&metric, h));
+            let best = field.direction(&mesh, &metric, mesh.face(h), field.branch_along(&metric, h, 0.0));
             assert!(along.dot(best) > 1.0 - 1e-9);
         }
     }
@@ -94,10 +94,10 @@ fn a_crossing_itself_and_an_open_end_are_told_apart() {
     // A meridian and the outer equator of one curve: a figure eight on the torus.
     mark(&mesh, &mut curves, 3, |p| p.x > 0.0 && p.y.abs() < 1e-9);
     mark(&mesh, &mut curves, 3, |p| (p.truncate().length() - 0.46).abs() < 1e-9);
-    let paths = trace_curves(&mesh, &curves).unwrap();
+    let paths = trace_curves(&mesh, &Metric::new(&mesh), &curves).unwrap();
     let mut lengths: Vec<usize> = paths.iter().map(|p| p.steps.len()).collect();
     lengths.sort_unstable();
     assert_eq!(lengths, vec![12, 24]);
     curves[edge_between(&mesh, 0, 1).index()] = None;
-    assert!(matches!(trace_curves(&mesh, &curves), Err(FieldError::OpenCurve { curve: 3, .. })));
+    assert!(matches!(trace_curves(&mesh, &Metric::new(&mesh), &curves), Err(FieldError::OpenCurve { curve: 3, .. })));
 }

@@ -13,7 +13,6 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::cut::Cut;
-use super::map::kept_coordinate;
 use super::{Strip, StripMap};
 use crate::field::{CrossField, EdgePath, Metric, Step};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
@@ -90,7 +89,7 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
     let mut taken = Vec::new();
     let mut visited = vec![[false; 2]; g.mesh.n_faces()];
     for side in 0..2 {
-        let seeds = path.steps.iter().filter_map(|&s| seed(g, s, side));
+        let seeds = path.steps.iter().zip(&path.lean).filter_map(|(&s, &lean)| seed(g, s, lean, side));
         let (bound, mut part) = conquer_side(g, closed, singular, seeds, &mut visited);
         bounds[side] = bound;
         if side == 1 {
@@ -105,12 +104,11 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
 
 /// The triangle left (side 0) or right of a step, and the lift in which the distance is zero on the step and
 /// positive inside.
-fn seed(g: &Ground<'_>, step: Step, side: usize) -> Option<(FaceId, Lift)> {
+fn seed(g: &Ground<'_>, step: Step, lean: f64, side: usize) -> Option<(FaceId, Lift)> {
     let h = if side == 0 { step.left(g.mesh) } else { step.right(g.mesh) }?;
     let f = g.mesh.face(h);
     // Along `h` runs branch `along` of the chart; to its left, a quarter turn on, the inside.
-    let along = g.field.branch_along(g.metric, h) - g.cut.turn[f.index()];
-    debug_assert_eq!(kept_coordinate(g.metric, g.field, g.cut, h), (along + 1).rem_euclid(2) as u32);
+    let along = g.field.branch_along(g.metric, h, lean) - g.cut.turn[f.index()];
     let branch = (along + 1).rem_euclid(4);
     let offset = -component(g.uv[f.index()][h.index() % 3], branch);
     Some((f, Lift { branch, offset }))

@@ -48,9 +48,9 @@ pub(super) fn solve(
     Ok(mesh.faces().map(|f| mesh.face_halfedges(f).map(at)).collect())
 }
 
-/// The coordinate, 0 or 1, that is constant along `h` where the field is aligned with it.
-pub(super) fn kept_coordinate(metric: &Metric, field: &CrossField, cut: &Cut, h: HalfedgeId) -> u32 {
-    let along = (field.branch_along(metric, h) - cut.turn[h.index() / 3]).rem_euclid(2);
+/// The coordinate, 0 or 1, that is constant along a curve that runs `lean` counter-clockwise of `h`.
+pub(super) fn kept_coordinate(metric: &Metric, field: &CrossField, cut: &Cut, h: HalfedgeId, lean: f64) -> u32 {
+    let along = (field.branch_along(metric, h, lean) - cut.turn[h.index() / 3]).rem_euclid(2);
     1 - along as u32
 }
 
@@ -62,9 +62,9 @@ fn curve_constraints(
     paths: &[EdgePath],
     out: &mut Vec<Constraint>,
 ) {
-    for step in paths.iter().flat_map(|p| &p.steps) {
+    for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
         let Some(h) = step.left(mesh).or_else(|| step.right(mesh)) else { continue };
-        let c = kept_coordinate(metric, field, cut, h);
+        let c = kept_coordinate(metric, field, cut, h, lean);
         let [a, b] = [h, mesh.next(h)].map(|h| 2 * cut.wedge[h.index()] + c);
         if a != b {
             out.push(Constraint { terms: vec![(a, 1.0), (b, -1.0)], rhs: 0.0 });

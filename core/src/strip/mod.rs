@@ -78,8 +78,8 @@ impl StripMap {
     ///
     /// See [`StripError`].
     pub fn new(mesh: &TriMesh, curve_of_edge: &[Option<u32>], progress: &Progress) -> Result<Self, StripError> {
-        let paths = trace_curves(mesh, curve_of_edge)?;
         let metric = Metric::new(mesh);
+        let paths = trace_curves(mesh, &metric, curve_of_edge)?;
         progress.report("cross field", 0.0);
         let field = field::interpolate(mesh, &metric, &paths, &[], progress)?;
         progress.report("strip map", 0.4);
@@ -136,9 +136,9 @@ fn residual(
     uv: &[[DVec2; 3]],
 ) -> f64 {
     let mut worst: f64 = 0.0;
-    for step in paths.iter().flat_map(|p| &p.steps) {
+    for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
         for h in [step.left(mesh), step.right(mesh)].into_iter().flatten() {
-            let c = map::kept_coordinate(metric, field, cut, h) as usize;
+            let c = map::kept_coordinate(metric, field, cut, h, lean) as usize;
             let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c]);
             worst = worst.max((a - b).abs());
         }

@@ -59,8 +59,12 @@ pub(super) fn interpolate_vectors(
     }
     let (matrix, rhs) = assemble(mesh, metric, hard, pull, &index, &free, 0.0);
     progress.check()?;
+    let density = (REACH * REACH).recip();
+    let (heavy, _) = assemble(mesh, metric, hard, pull, &index, &free, density);
     let symbolic = SpdSymbolic::new(&matrix)?;
-    let factor = symbolic.factor(&matrix)?;
+    progress.check()?;
+    let (factor, heavy_factor) = rayon::join(|| symbolic.factor(&matrix), || symbolic.factor(&heavy));
+    let (factor, heavy_factor) = (factor?, heavy_factor?);
     progress.check()?;
 
     let held = held_components(mesh, hard, pull);
@@ -70,14 +74,11 @@ pub(super) fn interpolate_vectors(
         let mass: Vec<f64> = free.iter().map(|&f| metric.area(f)).collect();
         z = inverse_iteration(&matrix, &factor, &rhs, &loose, &mass, progress)?;
     }
-    let density = (REACH * REACH).recip();
-    let (matrix, rhs) = assemble(mesh, metric, hard, pull, &index, &free, density);
-    let factor = symbolic.factor(&matrix)?;
     for _ in 0..STEPS {
         progress.check()?;
         let from = |i: usize| rhs[i] + unit(z[i]) * (density * metric.area(free[i]));
         let b: Vec<c64> = (0..z.len()).map(from).collect();
-        z = factor.solve(&matrix, &b)?;
+        z = heavy_factor.solve(&heavy, &b)?;
     }
     let value = |f: FaceId| hard[f.index()].unwrap_or_else(|| unit(z[index[f.index()] as usize]));
     Ok(mesh.faces().map(value).collect())

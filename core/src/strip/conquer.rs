@@ -9,17 +9,29 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::cut::Cut;
 use super::{Strip, StripMap};
-use crate::field::{CrossField, EdgePath, Metric, Step};
+use crate::field::{CrossField, EdgePath, Metric, Step, pronounced};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
 /// Folded triangles smaller than this part of the mean do not stop a strip: splitting edges leaves such slivers,
 /// and where isolines are forced through them their orientation means nothing.
 const SLIVER: f64 = 0.05;
+
+/// Singularities of opposite index closer than this, in lengths on a mesh of diagonal 1, do not end a strip: its
+/// isolines pass such a pair with a kink and go on as before.
+const PAIR: f64 = 0.04;
+
+/// Singularities closer to a curve than this do not end its strip: at this width one could not see it.
+const NEAR: f64 = 0.015;
+
+/// How far a front may have travelled over the surface for the distance it has gained, as a factor and as an addend
+/// in mean edge lengths. The map is close to isometric, so a front that goes on without gaining has been led astray
+/// by a singularity that did not end the strip.
+const DETOUR: (f64, f64) = (3.0, 2.0);
 
 /// What a strip has conquered: triangle, family (0: u constant), signed distance at its corners.
 type Conquest = (FaceId, u8, [f64; 3]);
@@ -32,6 +44,7 @@ pub(super) struct Ground<'a> {
     pub cut: &'a Cut,
     pub uv: &'a [[DVec2; 3]],
     pub flipped: &'a [bool],
+    pub mean_edge: f64,
 }
 
 /// Conquers for all `paths` and notes the results in `map`: of several strips the nearest covers a triangle.
@@ -42,7 +55,7 @@ pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath], map: &mut StripMa
         closed[f.index()] = ground.flipped[f.index()] && ground.metric.area(f) > SLIVER * mean;
     }
     let mut singular = vec![false; ground.mesh.n_vertices()];
-    for s in &ground.field.singularities {
+    for s in pronounced(ground.mesh, &ground.field.singularities, PAIR) {
         singular[s.vertex.index()] = true;
     }
     let results: Vec<_> = paths.par_iter().map(|p| conquer_one(ground, &closed, &singular, p)).collect();
@@ -66,6 +79,8 @@ pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath], map: &mut StripMa
 struct Lift {
     branch: i32,
     offset: f64,
+    /// Length of the front's way from the curve to the triangle.
+    travelled: f64,
 }
 
 impl Lift {
@@ -111,7 +126,7 @@ fn seed(g: &Ground<'_>, step: Step, lean: f64, side: usize) -> Option<(FaceId, L
     let along = g.field.branch_along(g.metric, h, lean) - g.cut.turn[f.index()];
     let branch = (along + 1).rem_euclid(4);
     let offset = -component(g.uv[f.index()][h.index() % 3], branch);
-    Some((f, Lift { branch, offset }))
+    Some((f, Lift { branch, offset, travelled: 0.0 }))
 }
 
 fn conquer_side(
@@ -135,6 +150,7 @@ fn conquer_side(
         push(&mut queue, &mut lifts, 0.0, f, lift);
     }
     let n_seeds = lifts.len();
+    let slack = DETOUR.1 * g.mean_edge;
     while let Some(Reverse((bits, f, at))) = queue.pop() {
         let (key, lift) = (f64::from_bits(bits), lifts[at]);
         if key >= bound {
@@ -142,8 +158,9 @@ fn conquer_side(
         }
         let family = lift.branch.rem_euclid(2) as usize;
         let d = g.uv[f.index()].map(|w| lift.distance(w));
-        // A front that has come around to the other side of its curve ends there.
-        let inside = at < n_seeds || d.iter().sum::<f64>() > 0.0;
+        // A front that has come around to the other side of its curve ends there, and one that goes astray.
+        let mean = d.iter().sum::<f64>() / 3.0;
+        let inside = at < n_seeds || (mean > 0.0 && lift.travelled < DETOUR.0 * mean + slack);
         if visited[f.index()][family] || closed[f.index()] || !inside {
             continue;
         }
@@ -151,8 +168,8 @@ fn conquer_side(
         taken.push((f, family as u8, d));
         for (i, h) in g.mesh.face_halfedges(f).into_iter().enumerate() {
             reach = reach.max(d[i]);
-            if singular[g.mesh.origin(h).index()] && d[i] > 0.0 {
-                bound = bound.min(d[i].max(key));
+            if singular[g.mesh.origin(h).index()] && d[i] > NEAR {
+                bound = bound.min(d[i]);
             }
             let Some(t) = g.mesh.twin(h) else { continue };
             let next = cross(g, lift, h, t, d[i]);
@@ -171,5 +188,7 @@ fn cross(g: &Ground<'_>, lift: Lift, h: HalfedgeId, t: HalfedgeId, d: f64) -> Li
     // w_to = i^{-p} w_from + T, so that i^{-b} w_from = i^{-(b - p)} w_to up to a constant.
     let branch = (lift.branch - jump).rem_euclid(4);
     let corner = g.mesh.next(t).index() % 3;
-    Lift { branch, offset: d - component(g.uv[to][corner], branch) }
+    let centre = |f: FaceId| g.mesh.face_vertices(f).map(|v| g.mesh.position(v)).iter().sum::<DVec3>() / 3.0;
+    let travelled = lift.travelled + centre(g.mesh.face(h)).distance(centre(g.mesh.face(t)));
+    Lift { branch, offset: d - component(g.uv[to][corner], branch), travelled }
 }

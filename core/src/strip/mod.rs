@@ -112,7 +112,8 @@ impl StripMap {
             stripe: vec![[[0.0; 3]; 2]; mesh.n_faces()],
         };
         let (field, uv, flipped) = (map.field.clone(), map.uv.clone(), map.flipped.clone());
-        let ground = conquer::Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped };
+        let mean_edge = mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
+        let ground = conquer::Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped, mean_edge };
         conquer::conquer(&ground, paths, &mut map);
         Ok(map)
     }

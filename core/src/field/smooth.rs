@@ -91,7 +91,6 @@ fn unit(z: c64) -> c64 {
 }
 
 /// The system of the free triangles, with a mass of `density` per area added.
-
 fn assemble(
     mesh: &TriMesh,
     metric: &Metric,

@@ -103,10 +103,10 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
     let mut bounds = [0.0; 2];
     let mut taken = Vec::new();
     let mut visited = vec![[false; 2]; g.mesh.n_faces()];
-    for side in 0..2 {
+    for (side, bound) in bounds.iter_mut().enumerate() {
         let seeds = path.steps.iter().zip(&path.lean).filter_map(|(&s, &lean)| seed(g, s, lean, side));
-        let (bound, mut part) = conquer_side(g, closed, singular, seeds, &mut visited);
-        bounds[side] = bound;
+        let (reached, mut part) = conquer_side(g, closed, singular, seeds, &mut visited);
+        *bound = reached;
         if side == 1 {
             for (_, _, d) in &mut part {
                 *d = d.map(|d| -d);

@@ -59,16 +59,6 @@ fn three_great_circles_of_a_sphere() {
     }
     let flipped = map.flipped.iter().filter(|&&f| f).count();
     assert!(flipped * 50 < mesh.n_faces(), "{flipped} of {}", mesh.n_faces());
-    let mut hist = std::collections::BTreeMap::new();
-    for f in mesh.faces() {
-        let [a, b, c] = map.uv[f.index()];
-        let k = ((b - a).perp_dot(c - a) * 0.5 / mesh.face_area(f) * 10.0) as i32;
-        *hist.entry(k).or_insert(0) += 1;
-    }
-    println!("{hist:?} flipped {flipped} of {} {:?}", mesh.n_faces(), map.strips);
-    for s in &map.field.singularities {
-        println!("{:?} {:?}", s, mesh.position(s.vertex) / 0.3);
-    }
     // By symmetry all strips are alike on both sides, and end at the singularities.
     for s in &map.strips {
         for b in s.bounds {

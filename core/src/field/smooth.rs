@@ -24,7 +24,7 @@ const WEIGHT: [f64; 2] = [1e-3, 1e2];
 const GROUND: f64 = 1e-7;
 /// Inverse iterations for a free component: the eigenvalues that compete differ by little only if their vectors
 /// are equally smooth.
-const ITERATIONS: usize = 12;
+const ITERATIONS: usize = 8;
 /// Reach of a diffusion step, in lengths on the mesh, whose bounding box has diagonal 1: pairs closer than about
 /// this vanish, features of the field of this size remain.
 const REACH: f64 = 0.1;

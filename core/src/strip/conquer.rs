@@ -120,13 +120,19 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
 /// The triangle left (side 0) or right of a step, and the lift in which the distance is zero on the step and
 /// positive inside.
 fn seed(g: &Ground<'_>, step: Step, lean: f64, side: usize) -> Option<(FaceId, Lift)> {
-    let h = if side == 0 { step.left(g.mesh) } else { step.right(g.mesh) }?;
-    let f = g.mesh.face(h);
-    // Along `h` runs branch `along` of the chart; to its left, a quarter turn on, the inside.
-    let along = g.field.branch_along(g.metric, h, lean) - g.cut.turn[f.index()];
-    let branch = (along + 1).rem_euclid(4);
-    let offset = -component(g.uv[f.index()][h.index() % 3], branch);
-    Some((f, Lift { branch, offset, travelled: 0.0 }))
+    let (left, right) = (step.left(g.mesh), step.right(g.mesh));
+    // Along `h` runs branch `along` of the chart; to its left, a quarter turn on, the inside, or the outside.
+    let inside = |h: HalfedgeId, quarters: i32| {
+        let f = g.mesh.face(h);
+        let branch = g.field.branch_along(g.metric, h, lean) - g.cut.turn[f.index()] + quarters;
+        Lift { branch, offset: -component(g.uv[f.index()][h.index() % 3], branch), travelled: 0.0 }
+    };
+    match (side, left, right) {
+        (0, Some(l), _) => Some((g.mesh.face(l), inside(l, 1))),
+        (1, Some(l), Some(r)) => Some((g.mesh.face(r), Lift { travelled: 0.0, ..cross(g, inside(l, -1), l, r, 0.0) })),
+        (1, None, Some(r)) => Some((g.mesh.face(r), inside(r, 1))),
+        _ => None,
+    }
 }
 
 fn conquer_side(
@@ -183,12 +189,11 @@ fn conquer_side(
 /// The lift continued from the triangle of `h` to that of its twin `t`, where `d` is the distance at the origin of
 /// `h`.
 fn cross(g: &Ground<'_>, lift: Lift, h: HalfedgeId, t: HalfedgeId, d: f64) -> Lift {
-    let (from, to) = (g.mesh.face(h).index(), g.mesh.face(t).index());
-    let jump = g.field.jump_across(g.mesh, h) + g.cut.turn[to] - g.cut.turn[from];
+    let jump = g.cut.jump_across(g.mesh, g.field, h, t);
     // w_to = i^{-p} w_from + T, so that i^{-b} w_from = i^{-(b - p)} w_to up to a constant.
     let branch = (lift.branch - jump).rem_euclid(4);
     let corner = g.mesh.next(t).index() % 3;
     let centre = |f: FaceId| g.mesh.face_vertices(f).map(|v| g.mesh.position(v)).iter().sum::<DVec3>() / 3.0;
     let travelled = lift.travelled + centre(g.mesh.face(h)).distance(centre(g.mesh.face(t)));
-    Lift { branch, offset: d - component(g.uv[to][corner], branch), travelled }
+    Lift { branch, offset: d - component(g.uv[t.index() / 3][corner], branch), travelled }
 }

@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 
 use super::StripError;
 use crate::field::{CrossField, Step};
-use crate::mesh::{EdgeId, FaceId, TriMesh, VertexId};
+use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 
 /// A cut surface with combed crosses.
 #[derive(Debug)]
@@ -36,6 +36,13 @@ pub(super) struct CutPath {
     pub steps: Vec<Step>,
     /// Period jump from its left to its right side, between combed crosses, 0 to 3.
     pub jump: i32,
+}
+
+impl Cut {
+    /// The period jump between combed crosses from the triangle of `h` to that of its twin, not reduced.
+    pub(super) fn jump_across(&self, mesh: &TriMesh, field: &CrossField, h: HalfedgeId, twin: HalfedgeId) -> i32 {
+        field.jump_across(mesh, h) + self.turn[twin.index() / 3] - self.turn[h.index() / 3]
+    }
 }
 
 /// Cuts `mesh` for `field`.

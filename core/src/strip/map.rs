@@ -10,7 +10,7 @@ use glam::DVec2;
 
 use super::StripError;
 use super::cut::Cut;
-use crate::field::{CrossField, EdgePath, Metric};
+use crate::field::{CrossField, EdgePath, Metric, Step};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::{Constraint, Reduction, SparseHermitian, SpdFactor, eliminate};
@@ -48,10 +48,24 @@ pub(super) fn solve(
     Ok(mesh.faces().map(|f| mesh.face_halfedges(f).map(at)).collect())
 }
 
-/// The coordinate, 0 or 1, that is constant along a curve that runs `lean` counter-clockwise of `h`.
-pub(super) fn kept_coordinate(metric: &Metric, field: &CrossField, cut: &Cut, h: HalfedgeId, lean: f64) -> u32 {
-    let along = (field.branch_along(metric, h, lean) - cut.turn[h.index() / 3]).rem_euclid(2);
-    1 - along as u32
+/// The half-edges of a curve's step, left and right, each with the coordinate (0 or 1) that is to be constant along
+/// it: on the left the one whose isolines are nearest to the curve, on the right its continuation.
+pub(super) fn kept_coordinates(
+    mesh: &TriMesh,
+    metric: &Metric,
+    field: &CrossField,
+    cut: &Cut,
+    step: Step,
+    lean: f64,
+) -> impl Iterator<Item = (HalfedgeId, u32)> {
+    let nearest = |h| (field.branch_along(metric, h, lean) - cut.turn[h.index() / 3] + 1).rem_euclid(2) as u32;
+    let (left, right) = (step.left(mesh), step.right(mesh));
+    let on_left = left.map(|h| (h, nearest(h)));
+    let on_right = right.map(|r| match on_left {
+        Some((l, kept)) => (r, (kept as i32 + cut.jump_across(mesh, field, l, r)).rem_euclid(2) as u32),
+        None => (r, nearest(r)),
+    });
+    on_left.into_iter().chain(on_right)
 }
 
 fn curve_constraints(
@@ -63,8 +77,8 @@ fn curve_constraints(
     out: &mut Vec<Constraint>,
 ) {
     for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
-        let Some(h) = step.left(mesh).or_else(|| step.right(mesh)) else { continue };
-        let c = kept_coordinate(metric, field, cut, h, lean);
+        // What holds on one side holds on the other by the seam's equations.
+        let Some((h, c)) = kept_coordinates(mesh, metric, field, cut, *step, lean).next() else { continue };
         let [a, b] = [h, mesh.next(h)].map(|h| 2 * cut.wedge[h.index()] + c);
         if a != b {
             out.push(Constraint { terms: vec![(a, 1.0), (b, -1.0)], rhs: 0.0 });

@@ -138,9 +138,8 @@ fn residual(
 ) -> f64 {
     let mut worst: f64 = 0.0;
     for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
-        for h in [step.left(mesh), step.right(mesh)].into_iter().flatten() {
-            let c = map::kept_coordinate(metric, field, cut, h, lean) as usize;
-            let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c]);
+        for (h, c) in map::kept_coordinates(mesh, metric, field, cut, *step, lean) {
+            let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c as usize]);
             worst = worst.max((a - b).abs());
         }
     }

@@ -141,3 +141,74 @@ fn without_curves_there_is_a_map_but_no_strip() {
     assert!(map.strips.is_empty());
     assert!(map.covered.iter().all(|c| *c == [None, None]));
 }
+
+#[test]
+fn a_curve_that_crosses_itself_and_cuts_along_curves() {
+    // The meridian and the outer equator as one curve, and both sides of a cube of which every edge is a curve.
+    let torus = torus(48, 12);
+    let mut curves = Vec::new();
+    mark(&torus, &mut curves, 5, |p| p.x > 0.0 && p.y.abs() < 1e-9);
+    mark(&torus, &mut curves, 5, |p| (p.truncate().length() - 0.46).abs() < 1e-9);
+    let one = map(&torus, &curves);
+    assert_eq!(one.strips.iter().map(|s| s.curve).collect::<Vec<_>>(), vec![5, 5]);
+    assert!(one.residual < 1e-9);
+    assert!(one.covered.iter().all(|c| c[0].is_some() && c[1].is_some()));
+
+    let cube = cells(&[[0, 0, 0]], 8);
+    let mut curves = Vec::new();
+    for axis in 0..3 {
+        mark(&cube, &mut curves, axis as u32, |p| (p[axis] - 0.1).abs() < 1e-9);
+    }
+    let cube_map = map(&cube, &curves);
+    check_seamless(&cube, &cube_map);
+    // The cube is the product of its three loops: the map is an isometry and covers it twice.
+    assert!(!cube_map.flipped.contains(&true));
+    for s in &cube_map.strips {
+        assert!(s.bounds.iter().all(|b| (b - 0.1).abs() < 1e-6), "{:?}", s.bounds);
+    }
+    assert!(cube_map.covered.iter().all(|c| c[0].is_some() && c[1].is_some()));
+    for f in cube.faces() {
+        let [a, b, c] = cube_map.uv[f.index()];
+        assert!((0.5 * (b - a).perp_dot(c - a) - cube.face_area(f)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn two_components_one_without_curves() {
+    let a = cells(&[[0, 0, 0], [3, 0, 0]], 4);
+    let mut curves = Vec::new();
+    mark(&a, &mut curves, 0, |p| (p.x - 0.1).abs() < 1e-9);
+    let map = map(&a, &curves);
+    check_seamless(&a, &map);
+    assert_eq!(map.field.singularities.len(), 16);
+    for f in a.faces() {
+        if a.face_vertices(f).iter().any(|&v| a.position(v).x > 0.5) {
+            assert_eq!(map.covered[f.index()], [None, None]);
+        }
+    }
+}
+
+#[test]
+fn one_thread_and_two_agree_to_the_bit() {
+    let sphere = octasphere(8);
+    let mut curves = Vec::new();
+    for axis in 0..3 {
+        mark(&sphere, &mut curves, axis as u32, |p| p[axis].abs() < 1e-9);
+    }
+    let with = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| map(&sphere, &curves));
+    let (one, two) = (with(1), with(2));
+    assert_eq!(one.uv, two.uv);
+    assert_eq!(one.stripe, two.stripe);
+    assert_eq!(one.covered, two.covered);
+}
+
+#[test]
+fn cancelled_work_stops() {
+    let mesh = octasphere(4);
+    let progress = Progress::new();
+    progress.cancel();
+    let result = StripMap::new(&mesh, &vec![None; mesh.n_edges()], &progress);
+    assert!(matches!(result, Err(StripError::Field(FieldError::Cancelled(_)))));
+    let wrong = StripMap::new(&mesh, &[], &Progress::new());
+    assert!(matches!(wrong, Err(StripError::Field(FieldError::WrongLength { .. }))));
+}

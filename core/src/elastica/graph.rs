@@ -10,7 +10,7 @@
 //! it, as it lets one distance field serve both ways.
 
 use std::f32::consts::PI;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI as PI64, TAU};
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -403,14 +403,25 @@ impl<'a> Weights<'a> {
     /// Alignment cost of leaving `v` in the unit direction `t`.
     fn at_vertex(&self, v: VertexId, t: DVec3) -> f64 {
         if self.on_crease[v.index()] {
-            let along = self.crease_directions(v).map(|s| s.dot(t)).fold(0.0, f64::max);
-            return self.feature((1.0 - along * along).max(0.0).sqrt());
+            return self.feature(self.crossing_sine(v, t));
         }
         let c = &self.curvature[v.index()];
         let (x, y) = (t.dot(c.d_min), t.dot(c.d_max));
         let longer = x.abs().max(y.abs());
         let deviation = if longer > 0.0 { x.hypot(y) / longer - 1.0 } else { 0.0 };
         deviation * (c.k_min.abs() - c.k_max.abs()).powi(2)
+    }
+
+    /// Sine of the angle at which `t` leaves the creases at `v`: zero along them, one across. At a corner halfway
+    /// between two creases is as good as across.
+    fn crossing_sine(&self, v: VertexId, t: DVec3) -> f64 {
+        let (mut nearest, mut second) = (PI64, PI64);
+        for s in self.crease_directions(v) {
+            let angle = s.cross(t).length().atan2(s.dot(t));
+            (nearest, second) = (nearest.min(angle), second.min(angle.max(nearest)));
+        }
+        let sum = nearest + second;
+        if sum > 0.0 { (PI64 * nearest / sum).min(FRAC_PI_2).sin() } else { 0.0 }
     }
 
     /// Cost of meeting a crease at an angle of the given sine.
@@ -577,7 +588,7 @@ fn middle(mesh: &TriMesh, g: &Geodesic, crossings: &[EdgeCrossing]) -> (FaceId, 
     let half = 0.5 * g.length;
     let (h, angle) = match crossings.iter().find(|c| c.distance >= half) {
         Some(c) => (c.halfedge, c.angle),
-        None => (g.end, g.end_angle + std::f64::consts::PI),
+        None => (g.end, g.end_angle + PI64),
     };
     (mesh.face(h), side_angle(mesh, h) + angle)
 }
@@ -587,7 +598,7 @@ fn side_angle(mesh: &TriMesh, h: HalfedgeId) -> f64 {
     let [first, second, _] = mesh.face_halfedges(mesh.face(h));
     match h.0 % 3 {
         0 => 0.0,
-        1 => std::f64::consts::PI - mesh.corner_angle(second),
-        _ => std::f64::consts::PI + mesh.corner_angle(first),
+        1 => PI64 - mesh.corner_angle(second),
+        _ => PI64 + mesh.corner_angle(first),
     }
 }

@@ -14,7 +14,7 @@ use crate::progress::{Cancelled, Progress};
 pub(super) struct BoundaryField {
     mask: DirectionMask,
     n_states: usize,
-    field: Field,
+    pub(super) field: Field,
 }
 
 impl SearchWorkspace {
@@ -71,7 +71,7 @@ impl BoundaryField {
     }
 
     /// Cheapest way from the middle of `a` to the boundary.
-    fn home(&self, graph: &ElasticaGraph, a: State) -> f32 {
+    pub(super) fn home(&self, graph: &ElasticaGraph, a: State) -> f32 {
         self.field.dist(graph.reverse[a as usize])
     }
 

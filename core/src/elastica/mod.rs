@@ -5,6 +5,7 @@
 //! direction and turning has a price. This room may use the mesh and the surface, and knows neither strips nor
 //! the user.
 
+mod anchors;
 mod boundary;
 mod direction;
 mod graph;
@@ -16,6 +17,7 @@ mod tests;
 mod trace;
 mod unfold;
 
+pub use anchors::{Anchor, AnchorQuery};
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
 pub use mask::DirectionMask;
 pub use proposals::{FoundLoop, ProposalQuery, Proposals};

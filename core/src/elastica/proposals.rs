@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::graph::{ElasticaGraph, State};
+use super::graph::ElasticaGraph;
 use super::mask::DirectionMask;
 use super::search::{LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
 use crate::mesh::{TriMesh, VertexId};
@@ -176,7 +176,7 @@ impl ElasticaGraph {
         sum
     }
 
-    fn found(&self, route: &Route) -> Option<FoundLoop> {
+    pub(super) fn found(&self, route: &Route) -> Option<FoundLoop> {
         let curve = self.curve(route)?;
         let [length, alignment, bending] = self.parts(route);
         let mut path: Vec<VertexId> = route.states.iter().map(|&e| self.origin(e)).collect();
@@ -190,9 +190,7 @@ impl ElasticaGraph {
 impl LoopSearch<'_> {
     /// The cheapest loop along the state nearest to `direction`.
     fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
-        let nearness = |a: &State| self.graph.departure(*a).dot(direction);
-        let out = self.graph.leaving(self.vertex).filter(|&a| self.mask.is_open(a));
-        let Some(a) = out.max_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(b.cmp(a))) else { return Ok(()) };
+        let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
         let open = self.work.boundary.as_ref().and_then(|b| b.through(self.graph, self.vertex, a));
         let limit = open.as_ref().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);

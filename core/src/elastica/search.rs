@@ -34,7 +34,7 @@ struct Label {
     /// The search this label belongs to; labels of earlier searches do not exist.
     stamp: u32,
     parent: State,
-    /// Index among the states leaving the source.
+    /// Index among the states leaving the source; or the leg of the parent.
     origin: u16,
     settled: bool,
 }
@@ -74,7 +74,7 @@ impl Field {
 
     /// Final distance, infinite where none is known.
     #[inline]
-    fn settled(&self, e: State) -> f32 {
+    pub(super) fn settled(&self, e: State) -> f32 {
         self.get(e).filter(|l| l.settled).map_or(f32::INFINITY, |l| l.dist)
     }
 
@@ -110,7 +110,7 @@ impl Field {
 
     /// The next state that was not expanded since it was last set, marked as expanded.
     #[inline]
-    fn pop_fresh(&mut self) -> Option<(f32, State)> {
+    pub(super) fn pop_fresh(&mut self) -> Option<(f32, State)> {
         loop {
             let (key, e) = self.pop()?;
             let label = &mut self.labels[e as usize];
@@ -119,6 +119,12 @@ impl Field {
                 return Some((key, e));
             }
         }
+    }
+
+    /// The state before `e`, and the tag it was set with.
+    pub(super) fn parent(&self, e: State) -> (State, u16) {
+        let label = &self.labels[e as usize];
+        (label.parent, label.origin)
     }
 
     /// The states from the source to `e`.
@@ -137,6 +143,9 @@ pub struct SearchWorkspace {
     pub(super) root: Field,
     pub(super) star: Field,
     meets: Vec<(State, State)>,
+    /// Per leg of a loop through anchors.
+    pub(super) home: Vec<Field>,
+    pub(super) ahead: Vec<Field>,
     pub(super) boundary: Option<BoundaryField>,
 }
 

@@ -1,4 +1,4 @@
-//! Loops through several anchors, in order, each with or without a direction (7.4).
+//! Loops through several anchors, in order, each with or without a direction (Campen, chapter 8).
 //!
 //! A search state gains the leg it is on: leg `i` leads from anchor `i` to the next, and ends with the first state
 //! that leaves the next anchor. A field over all legs, backwards from the start anchor, holds the exact cheapest way
@@ -59,11 +59,10 @@ impl ElasticaGraph {
         if outcome == Err(Stop::Cancelled) {
             return Err(Cancelled);
         }
-        if let (Some(route), Some(first)) = (&mut best, query.anchors.first()) {
-            if let Some(i) = route.states.iter().position(|&e| self.origin(e) == first.vertex).filter(|_| route.closed)
-            {
-                route.states.rotate_left(i);
-            }
+        if let (Some(route), Some(first)) = (best.as_mut().filter(|r| r.closed), query.anchors.first()) {
+            // The search started at another anchor.
+            let start = route.states.iter().position(|&e| self.origin(e) == first.vertex);
+            route.states.rotate_left(start.unwrap_or(0));
         }
         let loops = best.and_then(|route| self.found(&route)).into_iter().collect();
         Ok(Proposals { loops, proved: outcome.is_ok(), settled: meter.settled })

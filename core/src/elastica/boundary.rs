@@ -1,4 +1,6 @@
-//! Curves from boundary to boundary through a vertex (7.4: one node for all boundaries).
+//! Curves from boundary to boundary through a vertex.
+//!
+//! As in Campen, chapter 8, all boundaries are one node of the graph.
 //!
 //! One field of distances from the boundary serves every vertex: reversed, it holds the cheapest way from each state
 //! to the boundary. It is computed once for each set of closed directions.

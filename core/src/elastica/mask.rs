@@ -45,7 +45,8 @@ impl DirectionMask {
 
 impl ElasticaGraph {
     /// Closes the geodesics that start, end or have their middle in `face` and run within `max_angle` radians of
-    /// `direction` (either way) there. At a strip the source takes 45° (section 8.5).
+    /// `direction` (either way) there. Along a strip 45° closes what is
+    /// equivalent to it and leaves what crosses it.
     pub fn disable_near(&self, mask: &mut DirectionMask, face: FaceId, direction: DVec3, max_angle: f64) {
         let mesh = &self.mesh;
         for h in mesh.face_halfedges(face) {

@@ -8,6 +8,7 @@
 mod anchors;
 mod boundary;
 mod direction;
+mod geodesics;
 mod graph;
 mod mask;
 mod proposals;
@@ -16,6 +17,7 @@ mod search;
 mod tests;
 mod trace;
 mod unfold;
+mod weights;
 
 pub use anchors::{Anchor, AnchorQuery};
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};

@@ -214,18 +214,34 @@ impl LoopSearch<'_> {
         }
         ball?;
         let mut cost = best.map_or(f32::INFINITY, |r| r.cost);
-        let slack = if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 };
-        self.corridor(cost * slack)?;
-        for (bound, a) in self.directions(cost * slack) {
-            if bound >= cost * slack {
+        self.corridor(cost * self.slack())?;
+        let directions = self.directions(cost * self.slack());
+        let mut solved = Vec::new();
+        for &(bound, a) in &directions {
+            if bound >= cost {
                 break;
             }
-            if let Some(route) = self.star(a, cost * slack)? {
-                cost = cost.min(route.cost);
+            if let Some(route) = self.star(a, cost)? {
+                cost = route.cost;
+                solved.push(a);
                 routes.push(route);
             }
         }
+        if self.factor > 1.0 {
+            let limit = cost * self.slack();
+            let wanted = directions.iter().filter(|(bound, a)| *bound < limit && !solved.contains(a));
+            let (found, complete) = self.stars(&wanted.map(|d| d.1).collect::<Vec<_>>(), limit)?;
+            routes.extend(found);
+            if !complete {
+                return Err(Stop::Spent);
+            }
+        }
         Ok(())
+    }
+
+    /// The factor, with room for rounding where costs up to it are wanted.
+    fn slack(&self) -> f32 {
+        if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
     }
 }
 

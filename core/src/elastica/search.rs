@@ -14,6 +14,9 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
 
 use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
@@ -142,6 +145,8 @@ impl Field {
 pub struct SearchWorkspace {
     pub(super) root: Field,
     pub(super) star: Field,
+    /// Per thread, for start directions that are searched at once.
+    stars: Vec<Mutex<Field>>,
     meets: Vec<(State, State)>,
     /// Per leg of a loop through anchors.
     pub(super) home: Vec<Field>,
@@ -336,8 +341,51 @@ impl LoopSearch<'_> {
 
     /// Step 3: the cheapest loop that starts with state `a`, if there is one cheaper than `limit`.
     pub(super) fn star(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
-        let graph = self.graph;
-        let (root, star) = (&self.work.root, &mut self.work.star);
+        let star = Star { graph: self.graph, mask: self.mask, root: &self.work.root };
+        star.cheapest(&mut self.work.star, a, limit, &mut self.meter)
+    }
+
+    /// Step 3 for several start states at once, each with an equal share of the budget, so that the result does not
+    /// depend on the number of threads. The flag tells whether all shares sufficed.
+    pub(super) fn stars(&mut self, starts: &[State], limit: f32) -> Result<(Vec<Route>, bool), Cancelled> {
+        let threads = rayon::current_num_threads();
+        self.work.stars.resize_with(threads + 1, Mutex::default);
+        let (root, fields) = (&self.work.root, &self.work.stars);
+        let (graph, mask, progress) = (self.graph, self.mask, self.meter.progress);
+        let share = (self.meter.budget - self.meter.settled) / (starts.len() as u64).max(1);
+        let results: Vec<(u64, Result<Option<Route>, Stop>)> = starts
+            .par_iter()
+            .map(|&a| {
+                let thread = rayon::current_thread_index().map_or(threads, |t| t.min(threads));
+                let mut field = fields[thread].lock().unwrap_or_else(PoisonError::into_inner);
+                let mut meter = Meter { progress, budget: share, settled: 0 };
+                let route = Star { graph, mask, root }.cheapest(&mut field, a, limit, &mut meter);
+                (meter.settled, route)
+            })
+            .collect();
+        let (mut routes, mut complete) = (Vec::new(), true);
+        for (settled, result) in results {
+            self.meter.settled += settled;
+            match result {
+                Ok(route) => routes.extend(route),
+                Err(Stop::Spent) => complete = false,
+                Err(Stop::Cancelled) => return Err(Cancelled),
+            }
+        }
+        Ok((routes, complete))
+    }
+}
+
+/// What the searches of step 3 share.
+struct Star<'a> {
+    graph: &'a ElasticaGraph,
+    mask: &'a DirectionMask,
+    root: &'a Field,
+}
+
+impl Star<'_> {
+    fn cheapest(&self, star: &mut Field, a: State, limit: f32, meter: &mut Meter) -> Result<Option<Route>, Stop> {
+        let (graph, root) = (self.graph, self.root);
         star.restart(graph.n_states());
         let (mut cost, mut last) = (limit, NO_STATE);
         let (mut from, mut d, mut parent) = (a, 0.0, NO_STATE);
@@ -362,7 +410,7 @@ impl LoopSearch<'_> {
                 }
             }
             let Some((_, e)) = star.pop_fresh().filter(|&(key, _)| key < cost) else { break };
-            self.meter.tick()?;
+            meter.tick()?;
             (from, d, parent) = (e, star.dist(e), e);
         }
         if last == NO_STATE {

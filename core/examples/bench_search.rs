@@ -117,17 +117,19 @@ fn main() {
     println!("settled, % of states  {}", summary(states));
     println!("first / cheapest cost {}", summary(ratio));
     println!("cheapest cost         {}", summary(cost));
-    let (mut all, mut routes, mut unproved) = (Vec::new(), Vec::new(), 0);
+    let (mut all, mut routes, mut all_states, mut unproved) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for &v in vertices.iter().take(60) {
         let start = Instant::now();
         let query = ProposalQuery::alternatives(v, &mask);
         let found = graph.proposals(&query, &mut work, &progress).expect("not cancelled");
         all.push(ms(start));
         routes.push(found.loops.len() as f64);
+        all_states.push(100.0 * found.settled as f64 / graph.n_states() as f64);
         unproved += usize::from(!found.proved);
     }
     println!("alternatives, ms      {}   ({unproved} unproved)", summary(all));
     println!("alternatives, count   {}", summary(routes));
+    println!("settled, % of states  {}", summary(all_states));
     println!("plain Dijkstra, ms    {:9.2}", {
         let start = Instant::now();
         std::hint::black_box(graph.farthest(vertices[0]));

@@ -13,6 +13,7 @@ mod graph;
 mod mask;
 mod proposals;
 mod search;
+mod stars;
 #[cfg(test)]
 mod tests;
 mod trace;

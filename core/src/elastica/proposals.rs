@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::graph::ElasticaGraph;
+use super::graph::{ElasticaGraph, State};
 use super::mask::DirectionMask;
 use super::search::{LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
 use crate::mesh::{TriMesh, VertexId};
@@ -216,25 +216,14 @@ impl LoopSearch<'_> {
         let mut cost = best.map_or(f32::INFINITY, |r| r.cost);
         self.corridor(cost * self.slack())?;
         let directions = self.directions(cost * self.slack());
-        let mut solved = Vec::new();
-        for &(bound, a) in &directions {
-            if bound >= cost {
-                break;
-            }
-            if let Some(route) = self.star(a, cost)? {
-                cost = route.cost;
-                solved.push(a);
-                routes.push(route);
-            }
-        }
+        let known = routes.len();
+        self.improve(&directions, &mut cost, routes)?;
         if self.factor > 1.0 {
             let limit = cost * self.slack();
-            let wanted = directions.iter().filter(|(bound, a)| *bound < limit && !solved.contains(a));
-            let (found, complete) = self.stars(&wanted.map(|d| d.1).collect::<Vec<_>>(), limit)?;
-            routes.extend(found);
-            if !complete {
-                return Err(Stop::Spent);
-            }
+            // What was found on the way is the cheapest of its direction; the routes before need not be.
+            let solved = |a: State| routes[known..].iter().any(|r| r.states[0] == a);
+            let rest = directions.iter().filter(|&&(bound, a)| bound < limit && !solved(a)).map(|d| d.1).collect();
+            self.alternatives(rest, limit, routes)?;
         }
         Ok(())
     }

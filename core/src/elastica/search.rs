@@ -7,20 +7,19 @@
 //! 2. *Corridor*: beyond that radius only states are continued from which the way back is known and the whole
 //!    stays below the bound. Now `D(rev e)` is the exact cheapest way from `e` back to `v`, in any direction, for
 //!    each state that can lie on a loop below the bound.
-//! 3. *Star*: for each start direction that can still matter an A* search with that potential finds the cheapest
-//!    loop in that direction, up to the bound.
+//! 3. *Stars* ([`super::stars`]): for each start direction that can still matter an A* search with that potential
+//!    finds the cheapest loop in that direction, up to the bound.
 //!
 //! Reversal symmetry of the prices carries 1 and 2: one field from `v` serves both ways.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::{Mutex, PoisonError};
-
-use rayon::prelude::*;
+use std::sync::Mutex;
 
 use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
+use super::stars::Fan;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
@@ -37,7 +36,7 @@ struct Label {
     /// The search this label belongs to; labels of earlier searches do not exist.
     stamp: u32,
     parent: State,
-    /// Index among the states leaving the source; or the leg of the parent.
+    /// Index among the states leaving the source; with several legs, the leg of the parent.
     origin: u16,
     settled: bool,
 }
@@ -144,9 +143,10 @@ impl Field {
 #[derive(Debug, Default)]
 pub struct SearchWorkspace {
     pub(super) root: Field,
-    pub(super) star: Field,
+    /// The second front of a search from both ends.
+    pub(super) far: Field,
     /// Per thread, for start directions that are searched at once.
-    stars: Vec<Mutex<Field>>,
+    pub(super) fans: Vec<Mutex<Fan>>,
     meets: Vec<(State, State)>,
     /// Per leg of a loop through anchors.
     pub(super) home: Vec<Field>,
@@ -337,87 +337,5 @@ impl LoopSearch<'_> {
             .collect();
         list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         list
-    }
-
-    /// Step 3: the cheapest loop that starts with state `a`, if there is one cheaper than `limit`.
-    pub(super) fn star(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
-        let star = Star { graph: self.graph, mask: self.mask, root: &self.work.root };
-        star.cheapest(&mut self.work.star, a, limit, &mut self.meter)
-    }
-
-    /// Step 3 for several start states at once, each with an equal share of the budget, so that the result does not
-    /// depend on the number of threads. The flag tells whether all shares sufficed.
-    pub(super) fn stars(&mut self, starts: &[State], limit: f32) -> Result<(Vec<Route>, bool), Cancelled> {
-        let threads = rayon::current_num_threads();
-        self.work.stars.resize_with(threads + 1, Mutex::default);
-        let (root, fields) = (&self.work.root, &self.work.stars);
-        let (graph, mask, progress) = (self.graph, self.mask, self.meter.progress);
-        let share = (self.meter.budget - self.meter.settled) / (starts.len() as u64).max(1);
-        let results: Vec<(u64, Result<Option<Route>, Stop>)> = starts
-            .par_iter()
-            .map(|&a| {
-                let thread = rayon::current_thread_index().map_or(threads, |t| t.min(threads));
-                let mut field = fields[thread].lock().unwrap_or_else(PoisonError::into_inner);
-                let mut meter = Meter { progress, budget: share, settled: 0 };
-                let route = Star { graph, mask, root }.cheapest(&mut field, a, limit, &mut meter);
-                (meter.settled, route)
-            })
-            .collect();
-        let (mut routes, mut complete) = (Vec::new(), true);
-        for (settled, result) in results {
-            self.meter.settled += settled;
-            match result {
-                Ok(route) => routes.extend(route),
-                Err(Stop::Spent) => complete = false,
-                Err(Stop::Cancelled) => return Err(Cancelled),
-            }
-        }
-        Ok((routes, complete))
-    }
-}
-
-/// What the searches of step 3 share.
-struct Star<'a> {
-    graph: &'a ElasticaGraph,
-    mask: &'a DirectionMask,
-    root: &'a Field,
-}
-
-impl Star<'_> {
-    fn cheapest(&self, star: &mut Field, a: State, limit: f32, meter: &mut Meter) -> Result<Option<Route>, Stop> {
-        let (graph, root) = (self.graph, self.root);
-        star.restart(graph.n_states());
-        let (mut cost, mut last) = (limit, NO_STATE);
-        let (mut from, mut d, mut parent) = (a, 0.0, NO_STATE);
-        loop {
-            for f in graph.successors(from).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(from, f);
-                if reached >= star.dist(f) {
-                    continue;
-                }
-                let key = reached + root.settled(graph.reverse[f as usize]);
-                if key >= cost {
-                    continue;
-                }
-                // The potential is exact up to rounding only, so a state may be reached again, a bit cheaper.
-                star.set(f, reached, parent, 0);
-                star.push(key, f);
-                if graph.follows(f, a) {
-                    let closed = reached + graph.step(f, a);
-                    if closed < cost {
-                        (cost, last) = (closed, f);
-                    }
-                }
-            }
-            let Some((_, e)) = star.pop_fresh().filter(|&(key, _)| key < cost) else { break };
-            meter.tick()?;
-            (from, d, parent) = (e, star.dist(e), e);
-        }
-        if last == NO_STATE {
-            return Ok(None);
-        }
-        let mut states = vec![a];
-        states.extend(star.chain(last));
-        Ok(Some(Route { cost, states, closed: true }))
     }
 }

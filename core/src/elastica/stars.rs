@@ -13,9 +13,9 @@ use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::search::{Field, LoopSearch, Meter, Route, Stop};
 
-/// Widest range of start directions that share a sector field, in radians. The field knows the way back to within
-/// this and twice the largest turn.
-const SECTOR: f64 = 0.4;
+/// Widest range of start directions that share a sector field, in radians; 0.25 to 0.8 cost nearly the same. The
+/// field knows the way back to within this and twice the largest turn.
+const SECTOR: f64 = 0.5;
 
 /// States an A* search may settle before a sector field is worth its cost: at least so many, ...
 const QUICK_LEAST: u64 = 500;

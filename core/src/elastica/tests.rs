@@ -467,3 +467,53 @@ fn anchors_on_an_open_surface_can_be_passed_from_boundary_to_boundary() {
     assert_eq!(l.curve.check(g.mesh()), Ok(()));
     assert!((l.cost - l.length).abs() < 0.05 * l.length, "{} of length {}", l.cost, l.length);
 }
+
+#[test]
+fn open_curves_are_exact() {
+    let mask = DirectionMask::none();
+    for mesh in [Some(tube(16, 24)), real("half_torus.obj")].into_iter().flatten() {
+        let g = graph(mesh);
+        let half = |e: State| g.half_parts(e).iter().sum::<f32>();
+        let ends = |e: State| g.mesh().is_boundary_vertex(VertexId(g.target[e as usize]));
+        let home = |a: State| {
+            let d = distances(&g, a);
+            let onwards = (0..g.n_states() as State).filter(|&e| ends(e)).map(|e| d[e as usize] + half(e));
+            onwards.fold(if ends(a) { half(a) } else { f32::INFINITY }, f32::min)
+        };
+        for v in sample(&g, 2).filter(|&v| !g.mesh().is_boundary_vertex(v)) {
+            let out = g.leaving(v);
+            let homes: Vec<f32> = out.clone().map(home).collect();
+            let pairs = out.clone().flat_map(|a| out.clone().map(move |b| (a, b)));
+            let expected = pairs
+                .filter(|&(a, b)| g.follows(g.reverse[b as usize], a))
+                .map(|(a, b)| {
+                    let at = |s: State| homes[(s - out.start) as usize];
+                    at(a) + at(b) + g.step(g.reverse[b as usize], a)
+                })
+                .fold(f32::INFINITY, f32::min);
+            let query =
+                ProposalQuery { factor: 100.0, max: 1000, separation: 0.0, ..ProposalQuery::alternatives(v, &mask) };
+            let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+            let cheapest = found.loops.iter().find(|l| !l.curve.closed).unwrap();
+            assert!((cheapest.cost - f64::from(expected)).abs() < 1e-4 * cheapest.cost, "{} {expected}", cheapest.cost);
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let g = graph(torus(32, 16));
+            let mask = DirectionMask::none();
+            let mut work = SearchWorkspace::new();
+            let find = |v| {
+                let query = ProposalQuery { factor: 4.0, budget: 60_000, ..ProposalQuery::alternatives(v, &mask) };
+                g.proposals(&query, &mut work, &Progress::new()).unwrap()
+            };
+            sample(&g, 6).map(find).collect::<Vec<_>>()
+        })
+    };
+    assert_eq!(run(1), run(3));
+}

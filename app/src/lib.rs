@@ -1,6 +1,11 @@
 //! The program `plait`: window, input, panels, drawing and command line around `plait-core`.
 
 pub mod camera;
+pub mod demo;
+pub mod engine;
 pub mod input;
 pub mod picker;
 pub mod render;
+pub mod shading;
+pub mod window;
+pub mod worker;

@@ -16,9 +16,7 @@ pub struct DemoOpener;
 
 impl Opener for DemoOpener {
     fn built_ins(&self) -> Vec<BuiltIn> {
-        [("Torus", "genus 1"), ("Sphere", "genus 0")]
-            .map(|(n, h)| BuiltIn { name: n.into(), hint: h.into() })
-            .to_vec()
+        [("Torus", "genus 1"), ("Sphere", "genus 0")].map(|(n, h)| BuiltIn { name: n.into(), hint: h.into() }).to_vec()
     }
 
     fn open(&self, source: &Source, progress: &Progress) -> Result<Box<dyn Engine>, EngineError> {
@@ -179,10 +177,7 @@ impl Engine for Demo {
         let n = self.faces.len();
         let family = |k: usize| self.done.iter().enumerate().filter(move |(i, s)| s.visible && i % 2 == k).map(|x| x.1);
         let nearest = |p: DVec3, k: usize| {
-            family(k)
-                .map(|s| (p - s.origin).dot(s.normal))
-                .min_by(|a, b| a.abs().total_cmp(&b.abs()))
-                .unwrap_or(9.0)
+            family(k).map(|s| (p - s.origin).dot(s.normal)).min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(9.0)
         };
         let mut stripes = Vec::with_capacity(n);
         let mut covered = Vec::with_capacity(n);
@@ -218,8 +213,14 @@ impl Engine for Demo {
         let remains = match self.done.len() {
             0 => vec![(RegionColor::Red, "No strip is placed yet")],
             1 => vec![(RegionColor::Red, "1 region is not a disc")],
-            2 => vec![(RegionColor::Red, "1 region is not a disc"), (RegionColor::Orange, "2 regions have several corners")],
-            3 => vec![(RegionColor::Orange, "1 region has several corners"), (RegionColor::Yellow, "1 region does not fit its curvature")],
+            2 => vec![
+                (RegionColor::Red, "1 region is not a disc"),
+                (RegionColor::Orange, "2 regions have several corners"),
+            ],
+            3 => vec![
+                (RegionColor::Orange, "1 region has several corners"),
+                (RegionColor::Yellow, "1 region does not fit its curvature"),
+            ],
             _ => vec![],
         };
         let ready = self.done.len() > 3;
@@ -279,7 +280,8 @@ fn read(path: &Path) -> Result<Soup, EngineError> {
         let (nv, nf, _) = (w.next().unwrap_or(0.0), w.next().unwrap_or(0.0), w.next());
         let mut num = || w.next().unwrap_or(0.0);
         let p = (0..nv as usize).map(|_| DVec3::new(num(), num(), num())).collect();
-        let f = (0..nf as usize).map(|_| [num(), num(), num(), num()]).map(|[_, a, b, c]| [a as u32, b as u32, c as u32]);
+        let f =
+            (0..nf as usize).map(|_| [num(), num(), num(), num()]).map(|[_, a, b, c]| [a as u32, b as u32, c as u32]);
         return Ok((p, f.collect()));
     }
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
@@ -292,7 +294,8 @@ fn read(path: &Path) -> Result<Soup, EngineError> {
 fn torus() -> Soup {
     let (n, m) = (96u32, 40u32);
     let at = |i: u32, j: u32| {
-        let (a, b) = (f64::from(i) / f64::from(n) * std::f64::consts::TAU, f64::from(j) / f64::from(m) * std::f64::consts::TAU);
+        let (a, b) =
+            (f64::from(i) / f64::from(n) * std::f64::consts::TAU, f64::from(j) / f64::from(m) * std::f64::consts::TAU);
         let r = 1.0 + 0.4 * b.cos();
         DVec3::new(r * a.cos(), 0.4 * b.sin(), -r * a.sin())
     };

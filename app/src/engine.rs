@@ -55,7 +55,9 @@ impl Source {
     pub fn name(&self) -> String {
         match self {
             Self::BuiltIn(name) => name.clone(),
-            Self::File(path) => path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into()),
+            Self::File(path) => {
+                path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into())
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The program `plait`: window, input, panels, drawing and command line around `plait-core`.
 
 pub mod camera;
+pub mod cli;
 pub mod demo;
 pub mod engine;
 pub mod input;

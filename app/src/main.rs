@@ -1,16 +1,10 @@
-//! Plait.
-fn main() {
-    let arg = std::env::args().nth(1);
-    let source = arg.map(|a| plait_app::engine::Source::File(a.into()));
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default().with_inner_size([1440.0, 900.0]).with_title("Plait"),
-        ..Default::default()
-    };
-    let opener = std::sync::Arc::new(plait_app::demo::DemoOpener);
-    eframe::run_native(
-        "plait",
-        options,
-        Box::new(move |cc| Ok(Box::new(plait_app::window::PlaitApp::new(cc, opener, source)?))),
-    )
-    .unwrap();
+//! The program `plait`; see the library `plait_app`.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+fn main() -> ExitCode {
+    let filter = tracing_subscriber::EnvFilter::try_from_env("PLAIT_LOG").unwrap_or_else(|_| "error".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    plait_app::cli::run(std::env::args_os(), Arc::new(plait_app::demo::DemoOpener))
 }

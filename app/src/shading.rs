@@ -1,6 +1,6 @@
 //! From an engine's snapshot to what the renderer draws: triangles with colours and stripes, lines, markers.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::engine::{DisplaySurface, LayoutPreview, Proposal, RegionColor, Scene, StripId};
 use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
@@ -69,6 +69,18 @@ pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
 fn relative_to_whole(corners: [[f64; 2]; 3]) -> [[f64; 2]; 3] {
     let whole = corners[0].map(f64::floor);
     corners.map(|c| [c[0] - whole[0], c[1] - whole[1]])
+}
+
+/// Centre and radius of a sphere around all of the surface: around its box's centre.
+pub fn bounding_sphere(display: &DisplaySurface) -> (Vec3, f32) {
+    let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    display.positions.iter().for_each(|&p| bounds = (bounds.0.min(p), bounds.1.max(p)));
+    if !bounds.0.is_finite() || !bounds.1.is_finite() {
+        return (Vec3::ZERO, 0.5);
+    }
+    let centre = (bounds.0 + bounds.1) * 0.5;
+    let radius = display.positions.iter().map(|p| p.distance(centre)).fold(1e-3, f64::max);
+    (centre.as_vec3(), radius as f32)
 }
 
 /// Normals at the corners of each face: the mean, weighted by angle, over neighbours that turn by less than

@@ -46,29 +46,35 @@ impl Pipelines {
         let target_layout = target_layout(device);
         let surface_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/surface.wgsl"));
         let overlay_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/overlay.wgsl"));
-        let surface = pipeline(device, &Recipe {
-            label: "surface",
-            shader: &surface_shader,
-            entries: ["vertex_main", "fragment_main"],
-            layouts: &[Some(&view_layout)],
-            buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
-            topology: wgpu::PrimitiveTopology::TriangleList,
-            color: target::COLOR,
-            blend: None,
-            offscreen: true,
-        });
+        let surface = pipeline(
+            device,
+            &Recipe {
+                label: "surface",
+                shader: &surface_shader,
+                entries: ["vertex_main", "fragment_main"],
+                layouts: &[Some(&view_layout)],
+                buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
+                topology: wgpu::PrimitiveTopology::TriangleList,
+                color: target::COLOR,
+                blend: None,
+                offscreen: true,
+            },
+        );
         let overlay = |label, entries, buffer: Option<wgpu::VertexBufferLayout<'static>>, blend, topology| {
-            pipeline(device, &Recipe {
-                label,
-                shader: &overlay_shader,
-                entries,
-                layouts: &[Some(&view_layout), Some(&target_layout)],
-                buffer,
-                topology,
-                color: output,
-                blend,
-                offscreen: false,
-            })
+            pipeline(
+                device,
+                &Recipe {
+                    label,
+                    shader: &overlay_shader,
+                    entries,
+                    layouts: &[Some(&view_layout), Some(&target_layout)],
+                    buffer,
+                    topology,
+                    color: output,
+                    blend,
+                    offscreen: false,
+                },
+            )
         };
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let strip = wgpu::PrimitiveTopology::TriangleStrip;
@@ -114,11 +120,7 @@ fn target_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let texture = |binding, sample_type, multisampled| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::FRAGMENT,
-        ty: wgpu::BindingType::Texture {
-            sample_type,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled,
-        },
+        ty: wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled },
         count: None,
     };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

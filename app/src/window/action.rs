@@ -15,6 +15,8 @@ pub enum Action {
     AskSave,
     /// Ask for a folder and write the layout.
     AskExport,
+    /// How many quads an export has, about.
+    Quads(usize),
     /// Take back.
     Undo,
     /// Make again.

@@ -207,7 +207,8 @@ impl Plain {
             ui.horizontal(|ui| {
                 let label = ui.label("Name");
                 let width = (ui.available_width() - 4.0).max(60.0);
-                let line = ui.add(egui::TextEdit::singleline(&mut self.name).desired_width(width)).labelled_by(label.id);
+                let line =
+                    ui.add(egui::TextEdit::singleline(&mut self.name).desired_width(width)).labelled_by(label.id);
                 if line.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
                     result = self.accept().map(Some);
                 }
@@ -216,7 +217,11 @@ impl Plain {
                 ui.colored_label(super::theme::BAD, trouble);
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let verb = if self.asked == Asked::Open { "Open" } else { "Save" };
+                let verb = match self.asked {
+                    Asked::Open => "Open",
+                    Asked::Save => "Save",
+                    Asked::Export => "Export",
+                };
                 if ui.button(verb).clicked() {
                     result = self.accept().map(Some);
                 }

@@ -20,10 +20,11 @@ use messages::{Messages, Tone};
 use view::{Hover, Prepared};
 
 use crate::camera::Camera;
-use crate::engine::{EngineError, ExportOptions, Opener, Refinement, Scene, Source, StripId};
+use crate::engine::{EngineError, ExportOptions, Opener, Refinement, RegionColor, Scene, Source, StripId};
 use crate::input::Input;
 use crate::picker::Picker;
 use crate::render::Renderer;
+use crate::shading;
 use crate::worker::{Job, Reply, Running, Worker};
 
 /// Work that takes longer shows a progress bar.
@@ -32,6 +33,21 @@ const SHORT: Duration = Duration::from_millis(500);
 const PROGRESS_TICK: Duration = Duration::from_millis(100);
 /// Quads of an export when the user said nothing else.
 const DEFAULT_QUADS: usize = 10_000;
+
+/// Opens the window and returns when it was closed.
+///
+/// # Errors
+///
+/// When the system gives no window or no graphics device.
+pub fn run(opener: Arc<dyn Opener>, source: Option<Source>) -> Result<(), eframe::Error> {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("Plait")
+        .with_app_id("plait")
+        .with_inner_size([1440.0, 900.0])
+        .with_min_inner_size([720.0, 480.0]);
+    let options = eframe::NativeOptions { viewport, ..Default::default() };
+    eframe::run_native("plait", options, Box::new(move |cc| Ok(Box::new(PlaitApp::new(cc, opener, source)?))))
+}
 
 /// The program's window.
 pub struct PlaitApp {
@@ -128,15 +144,9 @@ impl PlaitApp {
     }
 
     fn frame_all(&mut self) {
-        let Some(scene) = &self.scene else { return };
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &p in &scene.surface.positions {
-            (low, high) = (low.min(p), high.max(p));
-        }
-        if low.is_finite() && high.is_finite() {
-            let centre = (low + high) * 0.5;
-            let radius = scene.surface.positions.iter().map(|p| p.distance(centre)).fold(1e-3, f64::max);
-            self.camera.frame(centre.as_vec3(), radius as f32, self.view_size);
+        if let Some(scene) = &self.scene {
+            let (centre, radius) = shading::bounding_sphere(&scene.surface);
+            self.camera.frame(centre, radius, self.view_size);
         }
     }
 
@@ -200,7 +210,8 @@ impl PlaitApp {
             Action::AskOpen => self.dialogs.ask(Asked::Open, ctx),
             Action::Open(source) => self.worker.request(Job::Open(source)),
             Action::AskSave => self.ask_with_name(Asked::Save, ctx),
-            Action::AskExport => self.ask_with_name(Asked::Export, ctx),
+            Action::AskExport => self.ask_export(ctx),
+            Action::Quads(quads) => self.quads = quads,
             Action::Undo => self.change(Job::Undo),
             Action::Redo => self.change(Job::Redo),
             Action::Suggest => self.change(Job::Suggest),
@@ -232,6 +243,19 @@ impl PlaitApp {
         let Some(scene) = &self.scene else { return };
         self.dialogs.suggested_name = scene.model.name.clone();
         self.dialogs.ask(asked, ctx);
+    }
+
+    /// Asks where to, or says at once why there is nothing to export yet.
+    fn ask_export(&mut self, ctx: &egui::Context) {
+        let Some(scene) = self.scene.as_deref() else { return };
+        if scene.exportable {
+            self.ask_with_name(Asked::Export, ctx);
+            return;
+        }
+        let urgent: Vec<_> = scene.remains.iter().filter(|r| r.color == RegionColor::Red).collect();
+        let reasons: Vec<_> = urgent.iter().map(|r| r.text.as_str()).collect();
+        let text = format!("There is no layout to export yet: {}", reasons.join("; "));
+        self.messages.add(Tone::Failed, text, urgent.iter().find_map(|r| r.place));
     }
 
     /// Turns toward a place, so that the viewer looks at it straight from outside the model's middle.

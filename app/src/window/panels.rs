@@ -1,6 +1,8 @@
 //! The panels: bar above, facts and lists at the right, hints below, messages and dialogs over the view.
 
-use egui::{Align, Align2, Color32, Frame, Key, KeyboardShortcut, Layout, Margin, Modifiers, RichText, Stroke, Ui, vec2};
+use egui::{
+    Align, Align2, Color32, Frame, Key, KeyboardShortcut, Layout, Margin, Modifiers, RichText, Stroke, Ui, vec2,
+};
 
 use super::action::{Action, ViewOption};
 use super::icons::{self, Icon};
@@ -19,27 +21,36 @@ const QUIT: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Q)
 
 /// All shortcuts and gestures, as the list shows them.
 const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
-    ("Weaving", &[
-        ("Move over the surface", "show the best strip through the point"),
-        ("Wheel", "browse alternatives through the same point"),
-        ("Click", "place the strip shown"),
-        ("S", "place the strip that helps most"),
-        ("Delete", "remove the selected strip"),
-        ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
-        ("Escape", "cancel what is running; deselect"),
-    ]),
-    ("View", &[
-        ("Left or middle drag", "orbit"),
-        ("Right drag, Shift+middle drag", "pan"),
-        ("Ctrl+wheel, wheel beside the model, pinch", "zoom"),
-        ("F", "look at the whole model"),
-        ("1, 2, 3, 4", "strips, region colours, layout, triangle edges"),
-    ]),
-    ("Files", &[
-        ("Ctrl+O", "open a mesh or a design; or drop a file on the window"),
-        ("Ctrl+S", "save the design"),
-        ("Ctrl+E", "export the layout"),
-    ]),
+    (
+        "Weaving",
+        &[
+            ("Move over the surface", "show the best strip through the point"),
+            ("Wheel", "browse alternatives through the same point"),
+            ("Click", "place the strip shown"),
+            ("S", "place the strip that helps most"),
+            ("Delete", "remove the selected strip"),
+            ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
+            ("Escape", "cancel what is running; deselect"),
+        ],
+    ),
+    (
+        "View",
+        &[
+            ("Left or middle drag", "orbit"),
+            ("Right drag, Shift+middle drag", "pan"),
+            ("Ctrl+wheel, wheel beside the model, pinch", "zoom"),
+            ("F", "look at the whole model"),
+            ("1, 2, 3, 4", "strips, region colours, layout, triangle edges"),
+        ],
+    ),
+    (
+        "Files",
+        &[
+            ("Ctrl+O", "open a mesh or a design; or drop a file on the window"),
+            ("Ctrl+S", "save the design"),
+            ("Ctrl+E", "export the layout"),
+        ],
+    ),
     ("Help", &[("?", "this list")]),
 ];
 
@@ -119,25 +130,29 @@ pub fn show(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 fn top_bar(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
-    egui::MenuBar::new().ui(ui, |ui| {
-        ui.label(RichText::new("Plait").size(17.0).color(theme::ACCENT));
-        ui.add_space(8.0);
-        ui.menu_button("File", |ui| file_menu(app, ui, actions));
-        ui.menu_button("Edit", |ui| {
-            let scene = app.scene.as_deref();
-            item(ui, actions, "Undo", "Ctrl+Z", scene.is_some_and(|s| s.can_undo), Action::Undo);
-            item(ui, actions, "Redo", "Ctrl+Shift+Z", scene.is_some_and(|s| s.can_redo), Action::Redo);
-            ui.separator();
-            let remove = app.selected.map(Action::Remove);
-            item(ui, actions, "Remove strip", "Delete", remove.is_some(), remove.unwrap_or(Action::Select(None)));
-            item(ui, actions, "Suggest a strip", "S", scene.is_some(), Action::Suggest);
-        });
-        ui.menu_button("View", |ui| view_menu(app, ui, actions));
-        ui.menu_button("Help", |ui| {
-            item(ui, actions, "Shortcuts", "?", true, Action::Shortcuts(true));
-            item(ui, actions, "About Plait", "", true, Action::About(true));
-        });
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Plait").size(18.0).color(theme::ACCENT));
+        ui.add_space(6.0);
+        egui::MenuBar::new().ui(ui, |ui| menus(app, ui, actions));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| quick_buttons(app, ui, actions));
+    });
+}
+
+fn menus(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
+    let scene = app.scene.as_deref();
+    ui.menu_button("File", |ui| file_menu(app, ui, actions));
+    ui.menu_button("Edit", |ui| {
+        item(ui, actions, "Undo", "Ctrl+Z", scene.is_some_and(|s| s.can_undo), Action::Undo);
+        item(ui, actions, "Redo", "Ctrl+Shift+Z", scene.is_some_and(|s| s.can_redo), Action::Redo);
+        ui.separator();
+        let remove = app.selected.map(Action::Remove);
+        item(ui, actions, "Remove strip", "Delete", remove.is_some(), remove.unwrap_or(Action::Select(None)));
+        item(ui, actions, "Suggest a strip", "S", scene.is_some(), Action::Suggest);
+    });
+    ui.menu_button("View", |ui| view_menu(app, ui, actions));
+    ui.menu_button("Help", |ui| {
+        item(ui, actions, "Shortcuts", "?", true, Action::Shortcuts(true));
+        item(ui, actions, "About Plait", "", true, Action::About(true));
     });
 }
 
@@ -152,13 +167,13 @@ fn file_menu(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
     });
     ui.separator();
     item(ui, actions, "Save design…", "Ctrl+S", open, Action::AskSave);
-    let ready = app.scene.as_deref().is_some_and(|s| s.exportable);
-    item(ui, actions, "Export layout…", "Ctrl+E", ready, Action::AskExport);
+    item(ui, actions, "Export layout…", "Ctrl+E", open, Action::AskExport);
     ui.separator();
     item(ui, actions, "Quit", "Ctrl+Q", true, Action::Quit);
 }
 
 fn view_menu(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
+    ui.set_width(MENU_WIDTH);
     for option in ViewOption::ALL {
         let (name, key) = option.label();
         let mut on = app.options.get(option);
@@ -175,8 +190,11 @@ fn view_menu(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
     item(ui, actions, "Whole model", "F", app.scene.is_some(), Action::FrameAll);
 }
 
+const MENU_WIDTH: f32 = 230.0;
+
+/// An entry of a menu; it closes the menu.
 fn item(ui: &mut Ui, actions: &mut Vec<Action>, name: &str, hint: &str, enabled: bool, action: Action) {
-    let button = egui::Button::new(name).shortcut_text(hint).min_size(vec2(ui.available_width(), 0.0));
+    let button = egui::Button::new(name).shortcut_text(hint).min_size(vec2(MENU_WIDTH, 0.0));
     if ui.add_enabled(enabled, button).clicked() {
         actions.push(action);
         ui.close();
@@ -185,14 +203,13 @@ fn item(ui: &mut Ui, actions: &mut Vec<Action>, name: &str, hint: &str, enabled:
 
 fn quick_buttons(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
     let scene = app.scene.as_deref();
-    let ready = scene.is_some_and(|s| s.exportable);
     let mut button = |ui: &mut Ui, name: &str, enabled: bool, action: Action| {
         if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
             actions.push(action);
         }
     };
     // From right to left.
-    button(ui, "Export", ready, Action::AskExport);
+    button(ui, "Export", scene.is_some(), Action::AskExport);
     button(ui, "Save", scene.is_some(), Action::AskSave);
     button(ui, "Open", true, Action::AskOpen);
     ui.add_space(10.0);
@@ -202,7 +219,8 @@ fn quick_buttons(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
 
 fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
     ui.add(egui::Label::new(RichText::new(&scene.model.name).heading()).truncate());
-    egui::Grid::new("facts").num_columns(2).spacing([18.0, 2.0]).show(ui, |ui| {
+    ui.spacing_mut().interact_size.y = 20.0;
+    egui::Grid::new("facts").num_columns(2).spacing([18.0, 0.0]).show(ui, |ui| {
         for (name, value) in &scene.model.facts {
             ui.label(RichText::new(name).color(theme::QUIET));
             ui.label(value);
@@ -212,12 +230,11 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
     section(ui, "What remains");
     what_remains(scene, ui, actions);
     ui.add_space(4.0);
-    let suggest = egui::Button::new(RichText::new("Suggest a strip").color(Color32::WHITE))
-        .fill(theme::ACCENT)
-        .stroke(Stroke::NONE)
-        .min_size(vec2(ui.available_width(), 32.0));
-    let suggest = ui.add_enabled(!scene.exportable || !scene.remains.is_empty(), suggest);
-    if suggest.on_hover_text("Places the strip that helps most now (S)").clicked() {
+    if scene.exportable {
+        export_row(app, ui, actions);
+    }
+    let useful = !scene.exportable || !scene.remains.is_empty();
+    if wide_button(ui, "Suggest a strip", !scene.exportable, useful, "Places the strip that helps most now (S)") {
         actions.push(Action::Suggest);
     }
     section(ui, &format!("Strips · {}", scene.strips.len()));
@@ -231,6 +248,36 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
             strip_row(app, i, strip, ui, actions);
         }
     });
+}
+
+/// How many quads, and the button.
+fn export_row(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let label = ui.label(RichText::new("Quads, about").color(theme::QUIET));
+        let mut quads = app.quads;
+        let value = egui::DragValue::new(&mut quads).range(10..=5_000_000).speed(app.quads as f64 * 0.01);
+        if ui.add(value).labelled_by(label.id).changed() {
+            actions.push(Action::Quads(quads));
+        }
+    });
+    if wide_button(ui, "Export layout…", true, true, "Writes the layout and its quad mesh as OBJ (Ctrl+E)") {
+        actions.push(Action::AskExport);
+    }
+}
+
+/// A button over the whole width; `primary` fills it with the accent. Returns whether it was clicked.
+fn wide_button(ui: &mut Ui, text: &str, primary: bool, enabled: bool, hover: &str) -> bool {
+    let text = RichText::new(text).color(match (enabled, primary) {
+        (true, true) => Color32::WHITE,
+        (true, false) => theme::TEXT,
+        (false, _) => theme::QUIET,
+    });
+    let mut button = egui::Button::new(text);
+    if primary && enabled {
+        button = button.fill(theme::ACCENT).stroke(Stroke::NONE);
+    }
+    let size = vec2(ui.available_width(), 32.0);
+    ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner.on_hover_text(hover).clicked()
 }
 
 fn section(ui: &mut Ui, title: &str) {

@@ -39,7 +39,7 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.item_spacing = vec2(8.0, 6.0);
         style.spacing.button_padding = vec2(10.0, 5.0);
         style.spacing.interact_size.y = 26.0;
-        style.spacing.menu_width = 260.0;
+        style.spacing.window_margin = egui::Margin::same(16);
         style.interaction.selectable_labels = false;
         style.visuals = visuals();
     });

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Color32, FontId, PaintCallbackInfo, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, ScreenDescriptor};
+use egui::{Align2, Color32, FontId, PaintCallbackInfo, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 use glam::Vec2;
 use plait_core::surface::SurfacePoint;
 
@@ -162,7 +162,19 @@ fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
             }
         }
     });
+    drop_doubled_notches(&mut list);
     list
+}
+
+/// Virtual X servers (VNC, Xvfb) report the press and the release of a wheel's click as a notch each. Of two equal
+/// notches in a row within one frame the second goes; a real wheel turned that fast only loses some speed.
+fn drop_doubled_notches(events: &mut Vec<PointerEvent>) {
+    let mut last = None;
+    events.retain(|&event| {
+        let doubled = matches!(event, PointerEvent::Wheel(n, _) if n.abs() == 1.0) && last == Some(event);
+        last = (!doubled).then_some(event);
+        !doubled
+    });
 }
 
 fn event_position(event: PointerEvent) -> Option<Vec2> {
@@ -251,12 +263,7 @@ impl CallbackTrait for ViewCallback {
         Vec::new()
     }
 
-    fn paint(
-        &self,
-        _info: PaintCallbackInfo,
-        pass: &mut wgpu::RenderPass<'static>,
-        resources: &CallbackResources,
-    ) {
+    fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, resources: &CallbackResources) {
         if let Some(renderer) = resources.get::<Renderer>() {
             renderer.paint(pass);
         }
@@ -274,11 +281,7 @@ fn paint(app: &mut PlaitApp, ui: &Ui, rect: Rect) {
     };
     let viewport = info.viewport_in_pixels();
     let size = [viewport.width_px.max(1) as u32, viewport.height_px.max(1) as u32];
-    let toggles = Toggles {
-        stripes: app.options.stripes,
-        wireframe: app.options.wireframe,
-        tint: app.options.regions,
-    };
+    let toggles = Toggles { stripes: app.options.stripes, wireframe: app.options.wireframe, tint: app.options.regions };
     let view = app.camera.uniforms(Vec2::new(size[0] as f32, size[1] as f32));
     let frame = Frame { scene: scene_input(app), view, toggles, size, pixels_per_point };
     ui.painter().add(Callback::new_paint_callback(rect, ViewCallback { frame }));

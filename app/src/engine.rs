@@ -128,8 +128,14 @@ pub struct ExportReport {
 /// All `Err` values are [`EngineError::Cancelled`], or a failure that says why.
 #[allow(clippy::missing_errors_doc)] // said once, above
 pub trait Engine: Send {
-    /// The strips through a point of [`Scene::design_mesh`], best first; empty when there are none.
-    fn proposals(&mut self, at: SurfacePoint, progress: &Progress) -> Result<Vec<Proposal>, EngineError>;
+    /// The strips through a point of [`Scene::design_mesh`], best first; empty when there are none. A strip that is
+    /// found early, but not yet known to be the best, is handed to `first`.
+    fn proposals(
+        &mut self,
+        at: SurfacePoint,
+        first: &mut dyn FnMut(Proposal),
+        progress: &Progress,
+    ) -> Result<Vec<Proposal>, EngineError>;
     /// Places a proposal of this engine.
     fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError>;
     /// Removes a placed strip.
@@ -144,6 +150,8 @@ pub trait Engine: Send {
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
     /// What is to be shown now.
     fn scene(&self) -> Arc<Scene>;
+    /// Adds to the scene what takes long and may come later, such as the layout; returns whether the scene changed.
+    fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError>;
     /// Writes the design.
     fn save(&self, path: &Path) -> Result<(), EngineError>;
     /// Writes the finished layout into a folder; refuses while a region is red.

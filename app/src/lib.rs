@@ -2,11 +2,11 @@
 
 pub mod camera;
 pub mod cli;
-pub mod demo;
 pub mod engine;
 pub mod input;
 pub mod picker;
 pub mod render;
 pub mod shading;
+pub mod weaving;
 pub mod window;
 pub mod worker;

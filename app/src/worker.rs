@@ -70,12 +70,16 @@ pub enum Reply {
     },
     /// The design changed.
     Changed(Arc<Scene>),
+    /// The design is the same, the scene says more of it.
+    Completed(Arc<Scene>),
     /// The strips for a hover request.
     Proposals {
         /// Which request.
         generation: u64,
-        /// Best first.
+        /// Best first; of an answer that is not final, one that was found early.
         proposals: Vec<Proposal>,
+        /// Whether this is all.
+        complete: bool,
     },
     /// The design was written.
     Saved(PathBuf),
@@ -99,8 +103,8 @@ pub struct Running {
     pub since: Instant,
     /// How far; may be cancelled.
     pub progress: Arc<Progress>,
-    /// Whether this is a hover request.
-    pub hover: bool,
+    /// Whether anything else goes before it: a hover request, or what was left for later.
+    pub yields: bool,
 }
 
 #[derive(Default)]
@@ -108,6 +112,8 @@ struct State {
     jobs: VecDeque<Job>,
     hover: Option<(u64, SurfacePoint)>,
     generation: u64,
+    /// Whether the engine may still have something to add to its scene.
+    incomplete: bool,
     running: Option<Running>,
     closed: bool,
 }
@@ -158,7 +164,7 @@ impl Worker {
         if open {
             state.jobs.clear();
         }
-        if let Some(running) = state.running.as_ref().filter(|r| r.hover || open) {
+        if let Some(running) = state.running.as_ref().filter(|r| r.yields || open) {
             running.progress.cancel();
         }
         state.jobs.push_back(job);
@@ -170,7 +176,7 @@ impl Worker {
         let mut state = self.shared.lock();
         state.generation += 1;
         state.hover = Some((state.generation, at));
-        cancel_hover(&state);
+        cancel_yielding(&state);
         self.shared.wake.notify_one();
         state.generation
     }
@@ -179,7 +185,7 @@ impl Worker {
     pub fn forget_hover(&self) {
         let mut state = self.shared.lock();
         state.hover = None;
-        cancel_hover(&state);
+        cancel_yielding(&state);
     }
 
     /// Cancels the job being done and all that wait.
@@ -200,7 +206,7 @@ impl Worker {
     /// Whether nothing is being done or waits.
     pub fn is_idle(&self) -> bool {
         let state = self.shared.lock();
-        state.running.is_none() && state.jobs.is_empty() && state.hover.is_none()
+        state.running.is_none() && state.jobs.is_empty() && state.hover.is_none() && !state.incomplete
     }
 
     /// The next reply, if there is one.
@@ -209,8 +215,8 @@ impl Worker {
     }
 }
 
-fn cancel_hover(state: &State) {
-    if let Some(running) = state.running.as_ref().filter(|r| r.hover) {
+fn cancel_yielding(state: &State) {
+    if let Some(running) = state.running.as_ref().filter(|r| r.yields) {
         running.progress.cancel();
     }
 }
@@ -231,6 +237,18 @@ impl Drop for Worker {
 enum Task {
     Job(Job),
     Hover(u64, SurfacePoint),
+    /// Add to the scene what was left for later, while nothing else is asked.
+    Complete,
+}
+
+impl Task {
+    fn label(&self) -> String {
+        match self {
+            Self::Job(job) => job.label(),
+            Self::Hover(..) => "Looking for strips".into(),
+            Self::Complete => "Drawing the layout".into(),
+        }
+    }
 }
 
 /// The worker's end.
@@ -245,18 +263,20 @@ struct Loop {
 impl Loop {
     fn run(mut self) {
         while let Some((task, progress)) = self.next() {
-            let label = match &task {
-                Task::Job(job) => job.label(),
-                Task::Hover(..) => "Looking for strips".into(),
-            };
-            let hover = matches!(task, Task::Hover(..));
+            let label = task.label();
+            let yields = !matches!(task, Task::Job(_));
+            let changes = !matches!(task, Task::Hover(..) | Task::Complete);
             // A bug in the engine must cost one operation, not the user's session.
             let result = catch_unwind(AssertUnwindSafe(|| self.work(task, &progress)))
                 .unwrap_or_else(|_| Err(EngineError::failed("an internal error; the design is as it was before")));
-            self.shared.lock().running = None;
+            {
+                let mut state = self.shared.lock();
+                state.running = None;
+                state.incomplete |= changes;
+            }
             match result {
                 Ok(replies) => replies.into_iter().for_each(|r| drop(self.sender.send(r))),
-                Err(EngineError::Cancelled) if hover => {}
+                Err(EngineError::Cancelled) if yields => {}
                 Err(error) => drop(self.sender.send(Reply::Failed { label, error })),
             }
             (self.notify)();
@@ -274,13 +294,11 @@ impl Loop {
                 Some(job) => Some(Task::Job(job)),
                 None => state.hover.take().map(|(generation, at)| Task::Hover(generation, at)),
             };
+            let task = task.or_else(|| std::mem::take(&mut state.incomplete).then_some(Task::Complete));
             if let Some(task) = task {
                 let progress = Arc::new(Progress::new());
-                let (label, hover) = match &task {
-                    Task::Job(job) => (job.label(), false),
-                    Task::Hover(..) => ("Looking for strips".into(), true),
-                };
-                state.running = Some(Running { label, since: Instant::now(), progress: Arc::clone(&progress), hover });
+                let (label, yields) = (task.label(), !matches!(task, Task::Job(_)));
+                state.running = Some(Running { label, since: Instant::now(), progress: Arc::clone(&progress), yields });
                 drop(state);
                 (self.notify)();
                 return Some((task, progress));
@@ -295,8 +313,20 @@ impl Loop {
             Task::Job(job) => job,
             Task::Hover(generation, at) => {
                 let Some(engine) = &mut self.engine else { return Ok(None) };
-                let proposals = engine.proposals(at, progress)?;
-                return Ok(Some(Reply::Proposals { generation, proposals }));
+                let mut first = |proposal| {
+                    let proposals = vec![proposal];
+                    drop(self.sender.send(Reply::Proposals { generation, proposals, complete: false }));
+                    (self.notify)();
+                };
+                let proposals = engine.proposals(at, &mut first, progress)?;
+                return Ok(Some(Reply::Proposals { generation, proposals, complete: true }));
+            }
+            Task::Complete => {
+                let Some(engine) = &mut self.engine else { return Ok(None) };
+                let completed = engine.complete(progress);
+                // What was cut short is taken up again after what went before it.
+                self.shared.lock().incomplete |= matches!(completed, Err(EngineError::Cancelled));
+                return Ok(completed?.then(|| Reply::Completed(engine.scene())));
             }
         };
         let Some(engine) = &mut self.engine else { return Err(EngineError::failed("no model is open")) };

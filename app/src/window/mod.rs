@@ -152,7 +152,7 @@ impl PlaitApp {
 
     /// The work that has been going on long enough to be shown.
     fn long_work(&self) -> Option<Running> {
-        self.worker.running().filter(|r| !r.hover && r.since.elapsed() >= SHORT)
+        self.worker.running().filter(|r| !r.yields && r.since.elapsed() >= SHORT)
     }
 
     fn take_replies(&mut self) {
@@ -160,8 +160,9 @@ impl PlaitApp {
             match reply {
                 Reply::Opened { source, scene, picker } => self.opened(&source, scene, picker),
                 Reply::Changed(scene) => self.changed(scene),
-                Reply::Proposals { generation, proposals } => {
-                    if let Some(proposal) = self.hover.arrived(generation, proposals) {
+                Reply::Completed(scene) => self.scene = Some(scene),
+                Reply::Proposals { generation, proposals, complete } => {
+                    if let Some(proposal) = self.hover.arrived(generation, proposals, complete) {
                         self.worker.request(Job::Place(proposal));
                         self.hover.clear();
                     }
@@ -304,7 +305,7 @@ impl eframe::App for PlaitApp {
         for action in actions {
             self.act(action, &ctx);
         }
-        if self.worker.running().is_some_and(|r| !r.hover) {
+        if self.worker.running().is_some_and(|r| !r.yields) {
             ctx.request_repaint_after(PROGRESS_TICK);
         }
     }

@@ -108,7 +108,7 @@ fn escape(app: &PlaitApp) -> Action {
         Action::Shortcuts(false)
     } else if app.about_open {
         Action::About(false)
-    } else if app.worker.running().is_some_and(|r| !r.hover) {
+    } else if app.worker.running().is_some_and(|r| !r.yields) {
         Action::Cancel
     } else {
         Action::Select(None)

@@ -44,14 +44,17 @@ impl Hover {
         self.proposals.get(self.chosen)
     }
 
-    /// Takes in an answer; returns what is to be placed at once.
-    pub fn arrived(&mut self, generation: u64, proposals: Vec<Proposal>) -> Option<Proposal> {
+    /// Takes in an answer, final or early; returns what is to be placed at once.
+    pub fn arrived(&mut self, generation: u64, proposals: Vec<Proposal>, complete: bool) -> Option<Proposal> {
         if self.generation != Some(generation) {
             return None;
         }
-        self.generation = None;
         self.proposals = proposals;
         self.chosen = 0;
+        if !complete {
+            return None;
+        }
+        self.generation = None;
         let place = std::mem::take(&mut self.place_on_arrival);
         self.proposals.first().filter(|_| place).cloned()
     }

@@ -7,6 +7,8 @@ use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
 
 /// Placed strips.
 pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
+/// Placed strips beside a layout.
+const FAINT: [u8; 4] = [0x1f, 0x5f, 0xd0, 0x70];
 /// The selected strip.
 pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
 /// What a click would place.
@@ -138,14 +140,22 @@ pub struct Overlay<'a> {
 pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     let mut lines = Vec::new();
     let mut markers = Vec::new();
+    let layout = o.scene.layout.as_deref().filter(|_| o.layout);
     if o.strips {
         for strip in o.scene.strips.iter().filter(|s| s.visible) {
             let selected = o.selected == Some(strip.id);
-            let (color, width) = if selected { (SELECTED, 4.5) } else { (PLACED, 2.6) };
-            seamed(&mut lines, points(&strip.polyline), strip.closed, color, width);
+            let points = points(&strip.polyline);
+            match (selected, layout) {
+                (true, _) => seamed(&mut lines, points, strip.closed, SELECTED, 4.5),
+                (false, None) => seamed(&mut lines, points, strip.closed, PLACED, 2.6),
+                // Beside a layout, strips step back.
+                (false, Some(_)) => {
+                    lines.push(Polyline { points, closed: strip.closed, color: FAINT, width: 1.8, hidden: 0.0 });
+                }
+            }
         }
     }
-    if let Some(layout) = o.scene.layout.as_deref().filter(|_| o.layout) {
+    if let Some(layout) = layout {
         draw_layout(layout, &mut lines, &mut markers);
     }
     if let Some(proposal) = o.proposal {

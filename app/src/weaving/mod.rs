@@ -15,8 +15,8 @@ use plait_core::surface::SurfacePoint;
 use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
 use crate::engine::{
-    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal,
-    Refinement, Scene, Source, StripId,
+    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal, Refinement,
+    Scene, Source, StripId,
 };
 
 /// File name ending of designs.

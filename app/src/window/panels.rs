@@ -306,13 +306,14 @@ fn what_remains(scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 fn remark_row(remark: &Remark, color: Color32, ui: &mut Ui, actions: &mut Vec<Action>) {
-    ui.horizontal(|ui| {
+    ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(12.0, 18.0), egui::Sense::hover());
         ui.painter().circle_filled(rect.center(), 5.0, color);
+        let label = egui::Label::new(&remark.text).wrap();
         match remark.place {
-            None => drop(ui.label(&remark.text)),
+            None => drop(ui.add(label)),
             Some(place) => {
-                let link = ui.add(egui::Label::new(&remark.text).sense(egui::Sense::click()));
+                let link = ui.add(label.sense(egui::Sense::click()));
                 if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
                     actions.push(Action::LookAt(place));
                 }

@@ -469,6 +469,16 @@ mod tests {
     }
 
     #[test]
+    fn a_vertex_may_have_any_valence() {
+        // A disc of 200 000 triangles round one vertex; anything quadratic in the valence would not end.
+        let n = 200_000u32;
+        let rim = (0..n).map(|i| DVec3::new(f64::from(i).cos(), f64::from(i).sin(), 0.0));
+        let faces: Vec<[u32; 3]> = (0..n).map(|i| [0, i + 1, (i + 1) % n + 1]).collect();
+        let m = TriMesh::from_faces(std::iter::once(DVec3::ZERO).chain(rim).collect(), &faces).unwrap();
+        assert_eq!((m.outgoing(VertexId(0)).count(), m.euler_characteristic()), (n as usize, 1));
+    }
+
+    #[test]
     fn broken_input_is_named() {
         let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
         let err = |f: &[[u32; 3]]| TriMesh::from_faces(p.clone(), f).unwrap_err();

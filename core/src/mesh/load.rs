@@ -100,6 +100,9 @@ pub enum LoadError {
     /// The file cannot be read.
     #[error("{0}")]
     Io(#[from] std::io::Error),
+    /// A folder, a pipe or a device.
+    #[error("this is not a regular file")]
+    NotAFile,
     /// There is nothing in the file.
     #[error("the file is empty")]
     Empty,
@@ -186,6 +189,10 @@ pub enum LoadError {
 /// The file cannot be read, or its content is refused; see [`LoadError`].
 pub fn load(path: &Path) -> Result<LoadedMesh, LoadError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    // Reading a pipe or a device might never end.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(LoadError::NotAFile);
+    }
     parse(&std::fs::read(path)?, &name)
 }
 
@@ -268,6 +275,7 @@ mod tests {
         assert!(matches!(parse(b"", "a.obj"), Err(LoadError::Empty)));
         assert!(matches!(parse(b" \n\n", "a.stl"), Err(LoadError::Empty)));
         assert!(matches!(parse(b"hello world", "a.txt"), Err(LoadError::UnknownFormat)));
+        assert!(matches!(load(Path::new(env!("CARGO_MANIFEST_DIR"))), Err(LoadError::NotAFile)));
         assert!(matches!(load(Path::new("/nowhere/at/all.obj")), Err(LoadError::Io(_))));
     }
 
@@ -363,14 +371,21 @@ mod tests {
         }
 
         #[test]
-        fn truncated_files_never_panic(file in 0usize..64, at in 0.0f64..1.0) {
+        fn truncated_and_damaged_files_never_panic(
+            file in 0usize..64, at in 0.0f64..1.0, damage in prop::collection::vec((0.0f64..1.0, any::<u8>()), 0..4),
+        ) {
             if let Some(folder) = meshes() {
                 let rows = manifest(&folder);
                 let file = &rows[file % rows.len()].0;
+                let mut bytes = std::fs::read(folder.join(file)).unwrap();
                 // The smallest files are enough, and fast.
-                let bytes = std::fs::read(folder.join(file)).unwrap();
                 if bytes.len() < 200_000 {
-                    let _ = parse(&bytes[..(at * bytes.len() as f64) as usize], file);
+                    bytes.truncate((at * bytes.len() as f64) as usize);
+                    for (place, byte) in damage {
+                        let place = (place * bytes.len() as f64) as usize;
+                        bytes.get_mut(place).into_iter().for_each(|b| *b = byte);
+                    }
+                    let _ = parse(&bytes, file);
                 }
             }
         }

@@ -14,7 +14,7 @@ mod triangulate;
 mod write;
 
 pub use builtin::{builtin, builtin_names};
-pub use features::{SHARP_DIHEDRAL, sharp_edges};
+pub use features::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edges};
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
 pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};
 pub use repair::Repair;

@@ -97,11 +97,11 @@ impl SurfaceIndex {
     }
 }
 
-/// Pushes the children within `reach`, the nearer one on top.
+/// Pushes the children at a finite distance within `reach`, the nearer one on top.
 fn push_nearer_last(stack: &mut Vec<(u32, f64)>, children: [u32; 2], distance: [f64; 2], reach: f64) {
     let order = if distance[0] < distance[1] { [1, 0] } else { [0, 1] };
     for i in order {
-        if distance[i] <= reach {
+        if distance[i].is_finite() && distance[i] <= reach {
             stack.push((children[i], distance[i]));
         }
     }

@@ -7,20 +7,21 @@
 //! way does: Sharp and Crane 2020); until no such vertex is left the path is pulled again. The result is a
 //! geodesic of the allowed part, in general the shortest near the one found on midpoints.
 
+mod funnel;
+
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
 use super::relax::{Side, spokes_across};
 use super::{Crossing, CurveError};
+use funnel::{Corner, Unfolded};
 
-/// Distance in edge parameters at which a path passes the vertices that it bends around.
-const VERTEX_DISTANCE: f64 = 1e-3;
 /// A fan must be narrower than π by this (radians) to be worth a change of strip; far above rounding.
 const MIN_BEND: f64 = 1e-7;
 
@@ -116,25 +117,20 @@ pub fn geodesic_in(
     }
     let mut strip = midpoint_strip(mesh, start, end, &allowed)?;
     // Each pass shortens the path, so it ends by itself; the bound is for rounding.
-    for _ in 0..20 * strip.len() + 100 {
+    let mut passes = 20 * strip.len() + 100;
+    loop {
         trim(mesh, start, end, &mut strip);
         if strip.is_empty() {
             // One triangle holds both ends.
-            break;
+            return Some(VertexPath { start, end, crossings: Vec::new() });
         }
         let unfolded = Unfolded::new(mesh, &strip);
         let corners = unfolded.pull();
-        if !pass_one(mesh, &mut strip, &unfolded, &corners, &allowed) {
-            let crossings = unfolded.crossings(&strip, &corners);
-            return Some(VertexPath { start, end, crossings });
+        if passes == 0 || !pass_one(mesh, &mut strip, &unfolded, &corners, &allowed) {
+            return Some(VertexPath { start, end, crossings: unfolded.crossings(&strip, &corners) });
         }
+        passes -= 1;
     }
-    if strip.is_empty() {
-        return Some(VertexPath { start, end, crossings: Vec::new() });
-    }
-    let unfolded = Unfolded::new(mesh, &strip);
-    let crossings = unfolded.crossings(&strip, &unfolded.pull());
-    Some(VertexPath { start, end, crossings })
 }
 
 /// Whether an edge at an allowed triangle joins two vertices.
@@ -225,135 +221,6 @@ fn trim(mesh: &TriMesh, start: VertexId, end: VertexId, strip: &mut Vec<Halfedge
     }
 }
 
-/// A vertex at which the taut path bends: its side, and the crossings of its run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Corner {
-    side: Side,
-    first: usize,
-    last: usize,
-    point: DVec2,
-}
-
-/// A strip laid out in the plane.
-struct Unfolded {
-    start: DVec2,
-    end: DVec2,
-    right: Vec<DVec2>,
-    left: Vec<DVec2>,
-    /// First and last crossing of the run of each right and left end.
-    runs: [Vec<(usize, usize)>; 2],
-}
-
-impl Unfolded {
-    fn new(mesh: &TriMesh, strip: &[HalfedgeId]) -> Self {
-        // The third corner of the triangle of `h`, on the left of `h` laid from `a` to `b`.
-        let apex = |h: HalfedgeId, a: DVec2, b: DVec2| {
-            let (along, to) = (mesh.vector(h), -mesh.vector(mesh.prev(h)));
-            let length = along.length().max(f64::MIN_POSITIVE);
-            let (x, y) = (along.dot(to) / length, along.cross(to).length() / length);
-            let e = (b - a).normalize_or_zero();
-            a + e * x + e.perp() * y
-        };
-        let h = strip[0];
-        let (mut r, mut l) = (DVec2::ZERO, DVec2::new(mesh.vector(h).length(), 0.0));
-        let start = apex(h, r, l);
-        let (mut right, mut left) = (vec![r], vec![l]);
-        for w in strip.windows(2) {
-            let Some(entered) = mesh.twin(w[0]) else { break };
-            let p = apex(entered, l, r);
-            if w[1] == mesh.next(entered) {
-                l = p
-            } else {
-                r = p
-            }
-            right.push(r);
-            left.push(l);
-        }
-        let end = strip.last().and_then(|&h| mesh.twin(h)).map_or(r, |entered| apex(entered, l, r));
-        let runs = [Side::Right, Side::Left].map(|side| {
-            let end = |h| if side == Side::Left { mesh.target(h) } else { mesh.origin(h) };
-            let mut runs = vec![(0, 0); strip.len()];
-            for group in strip.chunk_by(|&a, &b| end(a) == end(b)).scan(0, |at, g| {
-                *at += g.len();
-                Some((*at - g.len(), *at - 1))
-            }) {
-                runs[group.0..=group.1].fill(group);
-            }
-            runs
-        });
-        Self { start, end, right, left, runs }
-    }
-
-    fn corner(&self, i: usize, side: Side) -> Corner {
-        let (first, last) = self.runs[usize::from(side == Side::Left)][i];
-        Corner { side, first, last, point: if side == Side::Left { self.left[i] } else { self.right[i] } }
-    }
-
-    /// Pulls the path taut: the corners at which it bends, in order.
-    fn pull(&self) -> Vec<Corner> {
-        let n = self.right.len();
-        let mut corners: Vec<Corner> = Vec::new();
-        let mut from = 0;
-        'apex: loop {
-            let apex = corners.last().map_or(self.start, |c| c.point);
-            // The funnel: the tightest left and right ends seen from the apex.
-            let (mut right, mut left): (Option<Corner>, Option<Corner>) = (None, None);
-            for i in from..=n {
-                let ends = if i < n {
-                    [self.corner(i, Side::Right), self.corner(i, Side::Left)]
-                } else {
-                    [Side::Right, Side::Left].map(|side| Corner { side, first: n, last: n, point: self.end })
-                };
-                for new in ends {
-                    let is_right = new.side == Side::Right;
-                    let (own, other) = if is_right { (&mut right, left) } else { (&mut left, right) };
-                    // Positive: the second is to the left of the first, seen from the apex.
-                    let turn = |a: DVec2, b: DVec2| (a - apex).perp_dot(b - apex) * if is_right { 1.0 } else { -1.0 };
-                    if own.is_some_and(|own| turn(own.point, new.point) < 0.0) {
-                        continue;
-                    }
-                    if let Some(bend) = other.filter(|o| turn(o.point, new.point) > 0.0) {
-                        from = bend.last + 1;
-                        corners.push(bend);
-                        continue 'apex;
-                    }
-                    *own = Some(new);
-                }
-            }
-            return corners;
-        }
-    }
-
-    /// The crossings of the taut path, kept off the vertices.
-    fn crossings(&self, strip: &[HalfedgeId], corners: &[Corner]) -> Vec<Crossing> {
-        let mut crossings = Vec::with_capacity(strip.len());
-        let (mut from, mut next) = (self.start, 0);
-        for (i, &halfedge) in strip.iter().enumerate() {
-            while next < corners.len() && corners[next].last < i {
-                from = corners[next].point;
-                next += 1;
-            }
-            let (r, l) = (self.right[i], self.left[i]);
-            let t = match corners.get(next) {
-                Some(c) if c.first <= i => {
-                    if c.side == Side::Left {
-                        1.0
-                    } else {
-                        0.0
-                    }
-                }
-                other => {
-                    let to = other.map_or(self.end, |c| c.point);
-                    let (a, b) = ((to - from).perp_dot(r - from), (to - from).perp_dot(l - from));
-                    if b > a { -a / (b - a) } else { 0.5 }
-                }
-            };
-            crossings.push(Crossing { halfedge, t: t.clamp(VERTEX_DISTANCE, 1.0 - VERTEX_DISTANCE) });
-        }
-        crossings
-    }
-}
-
 /// Leads the strip around the first corner that allows it; `false` where none does.
 fn pass_one(
     mesh: &TriMesh,
@@ -391,21 +258,6 @@ fn pass_one(
         return true;
     }
     false
-}
-
-impl Unfolded {
-    /// The angle of the strip at a corner between the path's parts before and after it, in radians.
-    fn swept(&self, c: &Corner, from: DVec2, to: DVec2) -> f64 {
-        let opposite = |i: usize| if c.side == Side::Left { self.right[i] } else { self.left[i] };
-        let rays = std::iter::once(from).chain((c.first..=c.last).map(opposite)).chain([to]);
-        let mut last: Option<DVec2> = None;
-        let mut sum = 0.0;
-        for ray in rays.map(|p| p - c.point) {
-            sum += last.map_or(0.0, |l| l.perp_dot(ray).abs().atan2(l.dot(ray)));
-            last = Some(ray);
-        }
-        sum
-    }
 }
 
 #[cfg(test)]
@@ -511,9 +363,7 @@ mod tests {
             let mut random = Random(4);
             for _ in 0..40 {
                 let [a, b] = [0; 2].map(|_| VertexId::new(random.below(mesh.n_vertices())));
-                let start = std::time::Instant::now();
                 let Some(path) = geodesic_in(&mesh, a, b, |_| true) else { continue };
-                eprintln!("{file} {} crossings {:.2} ms", path.crossings.len(), start.elapsed().as_secs_f64() * 1e3);
                 assert_eq!(path.check(&mesh), Ok(()));
                 let Some(strip) = midpoint_strip(&mesh, a, b, &|_| true) else { continue };
                 let crossings = strip.into_iter().map(|halfedge| Crossing { halfedge, t: 0.5 }).collect();

@@ -10,7 +10,7 @@ use crate::dual::Colour;
 use crate::layout::{Embedding, PatchMap, QuadLayout, embed, map_patches};
 use crate::mesh::{Normalization, VertexId, write_obj};
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, chord_counts, refine};
+use crate::quad::{QuadMesh, chord_counts, refine, smooth};
 
 /// How fine the quads are to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +66,8 @@ pub fn export(session: &Session, options: &ExportOptions, progress: &Progress) -
         QuadSize::Count(n) => edge_for_count(&maps, n),
     };
     let counts = chord_counts(&layout, &maps, target);
-    let quads = refine(&layout, &embedding, &maps, &counts);
+    let mut quads = refine(&layout, &embedding, &maps, &counts);
+    smooth(&mut quads, &model.mesh, progress)?;
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, maps, quads })
 }

@@ -74,7 +74,8 @@ impl Banded {
                 rows[p][k] = v / rows[q][0];
                 d -= rows[p][k] * v;
             }
-            if !(d > 0.0) {
+            // A number that is not one is refused too.
+            if d.is_nan() || d <= 0.0 {
                 return None;
             }
             rows[p][0] = d;

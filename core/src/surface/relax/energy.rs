@@ -25,6 +25,8 @@ use super::{Alignment, CurveCost, RelaxOptions};
 const ALIGNMENT_STEP: f64 = 1e-3;
 /// Smallest angle of a triangle that is told from zero, in radians; keeps needles from dividing by zero.
 const MIN_ANGLE: f64 = 1e-7;
+/// Shortest segment that is told from none, for meshes of diagonal 1; the square of it is still a normal number.
+const MIN_LENGTH: f64 = 1e-100;
 /// Decrease that a step must reach, as a fraction of what the gradient promises (Armijo).
 const ARMIJO: f64 = 1e-4;
 /// Halvings of a step before the damping is raised instead.
@@ -115,7 +117,7 @@ impl<'a> Energy<'a> {
         let from_pivot = |i: usize| self.edge[i] * if s.pivot == Side::Right { t[i] } else { 1.0 - t[i] };
         let (a, b) = (from_pivot(j), from_pivot(k));
         let (u, w) = (b * s.sin, b * s.cos - a);
-        let length = u.hypot(w).max(f64::MIN_POSITIVE.sqrt());
+        let length = (u * u + w * w).sqrt().max(MIN_LENGTH);
         let (da, db) = (sign * self.edge[j], sign * self.edge[k]);
         let inverse = 1.0 / length;
         Measure {
@@ -200,8 +202,40 @@ impl<'a> Energy<'a> {
         self.fidelity.iter().zip(t).map(|([a, b, c], t)| a + t * (b + t * c)).sum()
     }
 
-    fn value(&self, t: &[f64]) -> f64 {
-        self.cost(t).total + self.fidelity(t)
+    /// Length and angles of segment `j` to the normals of the edges it leaves and reaches.
+    fn length_and_angles(&self, t: &[f64], j: usize) -> (f64, f64, f64) {
+        let (k, s) = (self.after(j), &self.segments[j]);
+        let (sign, a, b) = match s.pivot {
+            Side::Right => (1.0, self.edge[j] * t[j], self.edge[k] * t[k]),
+            Side::Left => (-1.0, self.edge[j] * (1.0 - t[j]), self.edge[k] * (1.0 - t[k])),
+        };
+        let (u, w) = (b * s.sin, b * s.cos - a);
+        let phi = sign * w.atan2(u);
+        ((u * u + w * w).sqrt().max(MIN_LENGTH), phi, phi + sign * s.angle)
+    }
+
+    /// Cost and fidelity: what is minimised. The same as [`Self::cost`] and [`Self::fidelity`], without the
+    /// derivatives, since line searches ask for nothing else.
+    pub fn value(&self, t: &[f64]) -> f64 {
+        let n = self.segments.len();
+        let (mut length, mut bending, mut alignment) = (0.0, 0.0, 0.0);
+        let mut before = self.closed.then(|| self.length_and_angles(t, n - 1));
+        for j in 0..n {
+            let here = self.length_and_angles(t, j);
+            bending += match before {
+                Some(p) => 2.0 * (here.1 - p.2).powi(2) / (p.0 + here.0),
+                None => 2.0 * here.1 * here.1 / here.0,
+            };
+            length += here.0;
+            if let Some(q) = self.options.alignment {
+                alignment += self.alignment(q, t, j, [0.0])[0] * here.0;
+            }
+            before = Some(here);
+        }
+        if let Some(p) = before.filter(|_| !self.closed) {
+            bending += 2.0 * p.2 * p.2 / p.0;
+        }
+        length + self.options.alpha * alignment + self.options.beta * bending + self.fidelity(t)
     }
 
     /// The gradient at `t`; fills the Hessian.
@@ -324,6 +358,8 @@ mod tests {
             let fidelity = (0..n).map(|i| [0.1, 0.2 * i as f64 / n as f64, 0.5]).collect();
             let energy = Energy::new(&mesh, &options, &strip, fidelity, vec![(0.03, 0.97); n]);
             let t: Vec<f64> = strip.nodes.iter().map(|n| n.t).collect();
+            let sum = energy.cost(&t).total + energy.fidelity(&t);
+            assert!((energy.value(&t) - sum).abs() < 1e-12 * sum);
             assert!((energy.cost(&t).length - curve.length(&mesh)).abs() < 1e-12);
             let gradient = energy.derive(&t, &mut Banded::new(n, closed));
             for i in 0..n {

@@ -125,6 +125,53 @@ impl Strip {
         Some((first, count))
     }
 
+    /// The part of the strip from `reach` crossings before a run to `reach` after it, as an open strip whose
+    /// outermost crossings are held, two on each side; with the position of its first crossing. Held ends are
+    /// left out where the curve itself ends, and fewer crossings taken of a short closed curve. `None` where that
+    /// leaves nothing to slide.
+    ///
+    /// As its outermost segments cannot move, its energy differs from that of the whole by a constant.
+    pub fn window(&self, mesh: &TriMesh, run: (usize, usize), reach: usize) -> Option<(Self, usize)> {
+        let n = self.len();
+        let (first, end) = if self.closed {
+            let reach = reach.min((n - run.1) / 2);
+            if reach < 3 {
+                return None;
+            }
+            (n + run.0 - reach, n + run.0 + run.1 + reach)
+        } else {
+            (run.0.saturating_sub(reach), n.min(run.0 + run.1 + reach))
+        };
+        let mut nodes: Vec<Node> = (first..end).map(|k| self.nodes[k % n]).collect();
+        let m = nodes.len();
+        if self.closed || first > 0 {
+            nodes[..2].iter_mut().for_each(|node| node.held = Some(usize::MAX));
+            nodes[0].halfedge = mesh.twin(nodes[0].halfedge)?;
+        }
+        if self.closed || end < n {
+            nodes[m - 2..].iter_mut().for_each(|node| node.held = Some(usize::MAX));
+        }
+        Some((Self { nodes, closed: false }, first % n))
+    }
+
+    /// Puts a window of once `count` crossings back from position `first` on.
+    pub fn put_back(&mut self, window: Self, first: usize, count: usize) {
+        let (n, m) = (self.len(), window.len());
+        let mut nodes = window.nodes;
+        // What is held is as it was, but for what the window changed to hold it.
+        for (k, old) in [(0, first), (1, first + 1), (m - 2, first + count - 2), (m - 1, first + count - 1)] {
+            if nodes[k].held == Some(usize::MAX) {
+                nodes[k] = self.nodes[old % n];
+            }
+        }
+        if self.closed {
+            nodes.extend((count..n).map(|k| self.nodes[(first + k) % n]));
+            self.nodes = nodes;
+        } else {
+            self.nodes.splice(first..first + count, nodes);
+        }
+    }
+
     /// Angle of the fan of the run's vertex that the run sweeps, and the angle of the whole fan, in radians.
     ///
     /// The sweep is taken between the points where the curve enters and leaves the fan; the ends of an open
@@ -239,4 +286,93 @@ fn spokes_to_boundary_before(mesh: &TriMesh, entered: HalfedgeId, side: Side) ->
     spokes.push(inside);
     spokes.reverse();
     spokes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{cylinder, ring, upright};
+    use super::*;
+
+    #[test]
+    fn to_a_strip_and_back() {
+        let mesh = cylinder(12, 8, 0.1);
+        for curve in [ring(&mesh, 12, 4, 0.3), upright(&mesh, 12, 8, 2)] {
+            let strip = Strip::new(&curve);
+            let back = strip.curve();
+            for (i, (a, b)) in back.crossings.iter().zip(&curve.crossings).enumerate() {
+                assert!(a.halfedge == b.halfedge && (a.t - b.t).abs() < 1e-15);
+                assert!(strip.point(&mesh, i).distance(curve.point(&mesh, i)) < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn passing_there_and_back_restores_the_crossings() {
+        let mesh = cylinder(12, 8, 0.1);
+        for (curve, ends) in [(ring(&mesh, 12, 4, 0.3), false), (upright(&mesh, 12, 8, 2), true)] {
+            let strip = Strip::new(&curve);
+            let mut done = 0;
+            for i in 0..strip.len() {
+                for (side, other) in [(Side::Left, Side::Right), (Side::Right, Side::Left)] {
+                    let (v, run) = (strip.end(&mesh, i, side), strip.run(&mesh, i, side).unwrap());
+                    let mut moved = strip.clone();
+                    assert!(moved.pass(&mesh, run, side, 0.03));
+                    assert_eq!(moved.curve().check(&mesh), Ok(()));
+                    let at = (0..moved.len()).find(|&k| moved.end(&mesh, k, other) == v).unwrap();
+                    let back = moved.run(&mesh, at, other).unwrap();
+                    // All spokes are crossed on one side or the other; one more than triangles at a boundary.
+                    let spokes = mesh.outgoing(v).count() + usize::from(mesh.is_boundary_vertex(v));
+                    assert_eq!(run.1 + back.1, spokes);
+                    assert!(moved.pass(&mesh, back, other, 0.03));
+                    assert_eq!(moved.curve().check(&mesh), Ok(()));
+                    let list = |s: &Strip| {
+                        let mut list: Vec<HalfedgeId> = s.nodes.iter().map(|n| n.halfedge).collect();
+                        if s.closed {
+                            list.sort();
+                        }
+                        list
+                    };
+                    assert_eq!(list(&moved), list(&strip));
+                    done += usize::from(mesh.is_boundary_vertex(v));
+                }
+            }
+            assert_eq!(done > 0, ends);
+        }
+    }
+
+    #[test]
+    fn nothing_passes_over_a_boundary_or_a_held_crossing() {
+        let mesh = cylinder(12, 8, 0.0);
+        let low = ring(&mesh, 12, 0, 0.1);
+        let mut strip = Strip::new(&low);
+        let bottom = |s: &Strip, i, side| mesh.is_boundary_vertex(s.end(&mesh, i, side));
+        let i = (0..strip.len()).find(|&i| bottom(&strip, i, Side::Right)).unwrap();
+        let run = strip.run(&mesh, i, Side::Right).unwrap();
+        assert!(!strip.pass(&mesh, run, Side::Right, 0.03));
+        let run = strip.run(&mesh, i, Side::Left).unwrap();
+        strip.nodes[i].held = Some(i);
+        assert!(!strip.pass(&mesh, run, Side::Left, 0.03));
+        strip.nodes[i].held = None;
+        assert!(strip.pass(&mesh, run, Side::Left, 0.03));
+    }
+
+    #[test]
+    fn a_window_put_back_changes_nothing() {
+        let mesh = cylinder(20, 16, 0.1);
+        for curve in [ring(&mesh, 20, 4, 0.3), upright(&mesh, 20, 16, 2)] {
+            let strip = Strip::new(&curve);
+            for i in 0..strip.len() {
+                let run = strip.run(&mesh, i, Side::Left).unwrap();
+                let (window, first) = strip.window(&mesh, run, 6).unwrap();
+                assert!(window.nodes.iter().filter(|n| n.held.is_some()).count() >= 2);
+                let mut whole = strip.clone();
+                let count = window.len();
+                whole.put_back(window, first, count);
+                if strip.closed {
+                    whole.nodes.rotate_right(first);
+                }
+                assert_eq!(whole.nodes, strip.nodes);
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::surface::{Crossing, SurfaceCurve};
+use crate::surface::{Crossing, SurfaceCurve, VertexPath, geodesic_in};
 
 /// A small generator of numbers that look random (an LCG with the constants of Knuth's MMIX).
 pub struct Random(pub u64);
@@ -171,6 +171,28 @@ pub fn class_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<
         if root_a == root_b { up_b - up_a + signed[e.index()] } else { 0 }
     };
     (0..count).map(|_| number()).collect()
+}
+
+/// The closed curve of geodesics from each waypoint to the next, around each waypoint counter-clockwise at a
+/// thousandth of an edge: what a search on a graph of geodesics gives.
+pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve {
+    let next = |k: usize| waypoints[(k + 1) % waypoints.len()];
+    let paths: Vec<VertexPath> =
+        waypoints.iter().enumerate().map(|(k, &v)| geodesic_in(mesh, v, next(k), |_| true).unwrap()).collect();
+    let mut crossings = Vec::new();
+    for (k, path) in paths.iter().enumerate() {
+        crossings.extend(path.crossings.iter().copied());
+        let goal = mesh.face(paths[(k + 1) % paths.len()].crossings[0].halfedge);
+        // The outgoing half-edge at the waypoint, of the triangle the curve is in.
+        let mut out = mesh.prev(mesh.twin(path.crossings.last().unwrap().halfedge).unwrap());
+        while mesh.face(out) != goal {
+            crossings.push(Crossing { halfedge: mesh.prev(out), t: 1.0 - 1e-3 });
+            out = mesh.twin(mesh.prev(out)).unwrap();
+        }
+    }
+    let curve = SurfaceCurve { crossings, closed: true };
+    curve.check(mesh).unwrap();
+    curve
 }
 
 /// A mesh of the folder of real meshes, of bounding-box diagonal 1; `None` where there is none.

@@ -5,6 +5,9 @@
 //! closed one outwards), drop vertices that no face uses. An edge of more than two faces and a surface
 //! with one side are refused. Faces of zero area are kept: slivers are legal.
 
+mod orient;
+mod split;
+
 use std::collections::HashMap;
 use std::fmt;
 
@@ -265,140 +268,6 @@ impl Work {
         Ok(pairs)
     }
 
-    /// Orients each component consistently, a closed one outwards.
-    fn orient(&mut self, pairs: &Pairs) -> Result<(), LoadError> {
-        let components = self.components(pairs)?;
-        let boxes: Vec<Option<[DVec3; 2]>> = components.iter().map(|c| self.closed_box(c, pairs)).collect();
-        let mut first_turned = None;
-        let mut n_turned = 0;
-        let mut flip = vec![false; self.faces.len()];
-        for (i, component) in components.iter().enumerate() {
-            let n = component.len();
-            let against = component.iter().filter(|&&(_, turned)| turned).count();
-            // A closed surface inside another may bound a cavity and then faces inwards by right.
-            let is_outer = boxes[i].is_some_and(|inner| {
-                let inside = |outer: &[DVec3; 2]| outer[0].cmplt(inner[0]).all() && outer[1].cmpgt(inner[1]).all();
-                !boxes.iter().flatten().any(inside)
-            });
-            let volume = if is_outer { self.volume(component) } else { 0.0 };
-            let all = if volume == 0.0 { 2 * against > n } else { volume < 0.0 };
-            let turned = |&&(f, turned): &&(u32, bool)| (turned != all).then_some(f as usize);
-            if against == 0 && all {
-                let first = component.iter().map(|&(f, _)| f as usize).min().unwrap_or(0);
-                self.repairs.push(Repair::TurnedOutwards { count: n, first: self.face_ref(first) });
-            } else {
-                let least = component.iter().filter_map(|c| turned(&c)).min();
-                first_turned = first_turned.into_iter().chain(least).min();
-                n_turned += component.iter().filter_map(|c| turned(&c)).count();
-            }
-            for f in component.iter().filter_map(|c| turned(&c)) {
-                flip[f] = true;
-            }
-        }
-        if let Some(first) = first_turned {
-            self.repairs.push(Repair::Reoriented { count: n_turned, first: self.face_ref(first) });
-        }
-        for (face, _) in self.faces.iter_mut().zip(flip).filter(|(_, flip)| *flip) {
-            face.swap(1, 2);
-        }
-        Ok(())
-    }
-
-    /// The triangles of each component, each with whether it is turned against the component's first.
-    fn components(&self, pairs: &Pairs) -> Result<Vec<Vec<(u32, bool)>>, LoadError> {
-        let mut turned: Vec<Option<bool>> = vec![None; self.faces.len()];
-        let mut components = Vec::new();
-        for seed in 0..self.faces.len() as u32 {
-            if turned[seed as usize].is_some() {
-                continue;
-            }
-            turned[seed as usize] = Some(false);
-            let mut component = vec![(seed, false)];
-            let mut next = 0;
-            while next < component.len() {
-                let (f, f_turned) = component[next];
-                next += 1;
-                for h in 3 * f..3 * f + 3 {
-                    let g = pairs[h as usize];
-                    if g == NONE {
-                        continue;
-                    }
-                    let g_turned = f_turned ^ (self.side(h) == self.side(g));
-                    match turned[g as usize / 3] {
-                        None => {
-                            turned[g as usize / 3] = Some(g_turned);
-                            component.push((g / 3, g_turned));
-                        }
-                        Some(known) if known != g_turned => {
-                            let near = self.vertex_ref(self.side(h).0 as usize);
-                            return Err(LoadError::NonOrientable { face: self.face_ref(f as usize), near });
-                        }
-                        Some(_) => {}
-                    }
-                }
-            }
-            components.push(component);
-        }
-        Ok(components)
-    }
-
-    /// Bounding box of a component that has no boundary.
-    fn closed_box(&self, component: &[(u32, bool)], pairs: &Pairs) -> Option<[DVec3; 2]> {
-        let closed = component.iter().all(|&(f, _)| (3 * f..3 * f + 3).all(|h| pairs[h as usize] != NONE));
-        let vertices = component.iter().flat_map(|&(f, _)| self.faces[f as usize]);
-        let points = vertices.map(|v| self.raw.positions[v as usize]);
-        let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        closed.then(|| points.fold(start, |[min, max], p| [min.min(p), max.max(p)]))
-    }
-
-    /// Six times the volume inside a closed component, in the orientation of its first triangle.
-    fn volume(&self, component: &[(u32, bool)]) -> f64 {
-        let position = |v: u32| self.raw.positions[v as usize];
-        let center = component.first().map_or(DVec3::ZERO, |&(f, _)| position(self.faces[f as usize][0]));
-        let signed = component.iter().map(|&(f, turned)| {
-            let [a, b, c] = self.faces[f as usize].map(|v| position(v) - center);
-            let six = a.dot(b.cross(c));
-            if turned { -six } else { six }
-        });
-        signed.sum()
-    }
-
-    /// Gives each fan of triangles at a vertex a vertex of its own.
-    fn split_vertices(&mut self, pairs: &Pairs) {
-        let mut fans = Fans::new(3 * self.faces.len());
-        for (h, &g) in pairs.iter().enumerate().filter(|&(h, &g)| g != NONE && (h as u32) < g) {
-            for (i, v) in self.faces[h / 3].into_iter().enumerate() {
-                if let Some(j) = self.faces[g as usize / 3].iter().position(|&w| w == v)
-                    && [self.side(g).0, self.side(g).1].contains(&v)
-                {
-                    fans.unite(3 * (h as u32 / 3) + i as u32, 3 * (g / 3) + j as u32);
-                }
-            }
-        }
-        let mut first_fan = vec![NONE; self.raw.positions.len()];
-        let mut vertex_of_fan = vec![NONE; 3 * self.faces.len()];
-        let mut split = Vec::new();
-        for corner in 0..3 * self.faces.len() {
-            let fan = fans.root(corner as u32);
-            let v = &mut self.faces[corner / 3][corner % 3];
-            let first = &mut first_fan[*v as usize];
-            if *first == NONE {
-                *first = fan;
-                vertex_of_fan[fan as usize] = *v;
-            } else if vertex_of_fan[fan as usize] == NONE {
-                vertex_of_fan[fan as usize] = self.raw.positions.len() as u32;
-                self.raw.positions.push(self.raw.positions[*v as usize]);
-                split.push(*v);
-            }
-            *v = vertex_of_fan[fan as usize];
-        }
-        split.sort_unstable();
-        split.dedup();
-        if let Some(&first) = split.first() {
-            self.repairs.push(Repair::SplitVertices { count: split.len(), first: self.vertex_ref(first as usize) });
-        }
-    }
-
     fn drop_unused(&mut self) {
         let mut used = vec![false; self.raw.positions.len()];
         for &v in self.faces.iter().flatten() {
@@ -417,29 +286,6 @@ impl Work {
         for v in self.faces.iter_mut().flatten() {
             *v = renamed[*v as usize];
         }
-    }
-}
-
-/// Corners of triangles, united to the fans they form around their vertices.
-struct Fans(Vec<u32>);
-
-impl Fans {
-    fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-
-    /// The smaller root stays a root.
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
     }
 }
 

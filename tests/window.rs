@@ -96,8 +96,8 @@ fn a_strip_is_offered_browsed_placed_hidden_and_taken_back() {
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.is_empty()));
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, egui::Key::Z);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 1));
-    window.get_by_label("Strip 1").click();
-    window.run_steps(2);
+    window.get_by_label("Select Strip 1").click();
+    window.run_steps(6);
     window.key_press(egui::Key::Delete);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.is_empty()));
 }
@@ -123,10 +123,10 @@ fn suggestions_finish_a_torus_and_the_layout_is_shown() {
 fn exporting_too_early_says_why() {
     let mut window = open("torus");
     window.get_by_label("Export").click();
-    window.run_steps(2);
+    window.run_steps(6);
     window.get_by_label("There is no layout to export yet: No strip is placed yet");
     window.get_by_label("Dismiss").click();
-    window.run_steps(2);
+    window.run_steps(6);
     assert!(window.query_by_label("Dismiss").is_none());
 }
 

@@ -14,7 +14,6 @@ use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
 
 use crate::engine::{Engine, EngineError, ExportOptions, ExportReport, Opener, Proposal, Scene, Source, StripId};
-use crate::picker::Picker;
 
 /// Something to be done, in order.
 #[derive(Debug, Clone)]
@@ -65,8 +64,6 @@ pub enum Reply {
         source: Source,
         /// Its first snapshot.
         scene: Arc<Scene>,
-        /// Finds points of its design mesh.
-        picker: Arc<Picker>,
     },
     /// The design changed.
     Changed(Arc<Scene>),
@@ -324,8 +321,8 @@ impl Loop {
             Task::Complete => {
                 let Some(engine) = &mut self.engine else { return Ok(None) };
                 let completed = engine.complete(progress);
-                // What was cut short is taken up again after what went before it.
-                self.shared.lock().incomplete |= matches!(completed, Err(EngineError::Cancelled));
+                // There may be more to add; what was cut short is taken up again after what went before it.
+                self.shared.lock().incomplete |= matches!(completed, Ok(true) | Err(EngineError::Cancelled));
                 return Ok(completed?.then(|| Reply::Completed(engine.scene())));
             }
         };
@@ -356,9 +353,8 @@ impl Loop {
     fn open(&mut self, source: Source, progress: &Progress) -> Result<Reply, EngineError> {
         let engine = self.opener.open(&source, progress)?;
         let scene = engine.scene();
-        let picker = Arc::new(Picker::new(Arc::clone(&scene.design_mesh)));
         self.engine = Some(engine);
-        Ok(Reply::Opened { source, scene, picker })
+        Ok(Reply::Opened { source, scene })
     }
 }
 
@@ -368,7 +364,7 @@ mod tests {
     use crate::engine::BuiltIn;
     use glam::DVec3;
     use plait_core::mesh::{FaceId, TriMesh};
-    use plait_core::surface::SurfaceCurve;
+    use plait_core::surface::{SurfaceCurve, SurfaceIndex};
     use std::path::Path;
 
     /// An engine whose answers carry the face they were asked for as their cost. Undo waits to be cancelled, redo
@@ -387,6 +383,7 @@ mod tests {
             let mesh = TriMesh::from_faces(p, &[[0, 1, 2]]).map_err(|e| EngineError::failed(e.to_string()))?;
             Ok(Box::new(Fake(Arc::new(Scene {
                 model: Arc::default(),
+                index: Arc::new(SurfaceIndex::new(&mesh)),
                 design_mesh: Arc::new(mesh),
                 surface: Arc::default(),
                 strips: Vec::new(),

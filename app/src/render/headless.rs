@@ -149,7 +149,7 @@ mod tests {
             normal: [0.0, 0.0, 1.0],
             tint: [0; 4],
             stripe: [x * 10.0, y * 10.0],
-            flags: SurfaceVertex::COVERED_U,
+            reach: [[3, 3], [0, 0]],
         };
         let [a, b, c, d] = [corner(-0.4, -0.4), corner(0.4, -0.4), corner(0.4, 0.4), corner(-0.4, 0.4)];
         let camera = Camera { yaw: 0.0, pitch: 0.0, ..Camera::default() };

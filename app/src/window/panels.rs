@@ -327,7 +327,8 @@ fn strip_row(app: &PlaitApp, index: usize, strip: &Strip, ui: &mut Ui, actions: 
     let name = format!("Strip {}", index + 1);
     // The row takes clicks wherever no button on it does.
     let (rect, row) = ui.allocate_exact_size(vec2(ui.available_width(), 28.0), egui::Sense::click());
-    row.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &name));
+    let label = format!("Select {name}");
+    row.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &label));
     let fill = match (selected, row.hovered()) {
         (true, _) => theme::ACCENT_WASH,
         (false, true) => Color32::from_black_alpha(8),

@@ -49,7 +49,7 @@ pub struct Model {
     /// The elastica graph.
     pub graph: ElasticaGraph,
     /// Points by ray or nearness.
-    pub index: SurfaceIndex,
+    pub index: Arc<SurfaceIndex>,
     /// Pronounced corners of the shape: singularities of its smooth curvature-guided cross field, with their
     /// index in quarters.
     pub corners: Vec<(VertexId, i8)>,
@@ -66,7 +66,7 @@ impl Model {
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&mesh);
         let sharp = sharp_edges(&mesh, options.sharp_dihedral);
-        let index = SurfaceIndex::new(&mesh);
+        let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
         let curvature = principal_curvature(&mesh, options.curvature_radius, &sharp);

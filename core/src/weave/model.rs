@@ -51,7 +51,7 @@ pub struct Model {
     /// The elastica graph.
     pub graph: ElasticaGraph,
     /// Points by ray or nearness.
-    pub index: SurfaceIndex,
+    pub index: Arc<SurfaceIndex>,
     /// Pronounced corners of the shape: singularities of its smooth curvature-guided cross field, with their
     /// index in quarters.
     pub corners: Vec<(VertexId, i8)>,
@@ -69,7 +69,7 @@ impl Model {
         let topology = Topology::new(&mesh);
         let mut sharp = sharp_edges(&mesh, options.sharp_dihedral);
         drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
-        let index = SurfaceIndex::new(&mesh);
+        let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
         let curvature = principal_curvature(&mesh, options.curvature_radius, &sharp);

@@ -256,7 +256,7 @@ impl TriMesh {
     /// The previous half-edge around the triangle.
     #[inline]
     pub fn prev(&self, h: HalfedgeId) -> HalfedgeId {
-        HalfedgeId(if h.0 % 3 == 0 { h.0 + 2 } else { h.0 - 1 })
+        HalfedgeId(if h.0.is_multiple_of(3) { h.0 + 2 } else { h.0 - 1 })
     }
 
     /// The oppositely directed half-edge of the neighbouring triangle; `None` on the boundary.
@@ -400,7 +400,7 @@ fn check_faces(positions: &[DVec3], faces: &[[u32; 3]]) -> Result<(), TriMeshErr
     Ok(())
 }
 
-/// Finds the twin of every half-edge, by sorting the half-edges at each vertex.
+/// Finds the twin of every half-edge, by sorting the half-edges at each vertex by their target.
 fn connect(n_vertices: usize, origin: &[u32]) -> Result<Vec<u32>, TriMeshError> {
     let target = |h: usize| origin[if h % 3 == 2 { h - 2 } else { h + 1 }];
     let mut first = vec![0u32; n_vertices + 1];
@@ -416,19 +416,21 @@ fn connect(n_vertices: usize, origin: &[u32]) -> Result<Vec<u32>, TriMeshError> 
         out[fill[v as usize] as usize] = h as u32;
         fill[v as usize] += 1;
     }
-    let mut twin = vec![NONE; origin.len()];
-    for h in 0..origin.len() {
-        let (a, b) = (origin[h], target(h));
-        let at = |v: u32| &out[first[v as usize] as usize..first[v as usize + 1] as usize];
-        if let Some(&g) = at(a).iter().find(|&&g| g as usize != h && target(g as usize) == b) {
-            let (first, second) = ((h / 3).min(g as usize / 3), (h / 3).max(g as usize / 3));
-            return Err(TriMeshError::NonManifoldEdge { from: a, to: b, first, second });
-        }
-        if let Some(&g) = at(b).iter().find(|&&g| target(g as usize) == a) {
-            twin[h] = g;
+    for v in 0..n_vertices {
+        let range = first[v] as usize..first[v + 1] as usize;
+        let out = &mut out[range];
+        out.sort_unstable_by_key(|&h| (target(h as usize), h));
+        if let Some(w) = out.windows(2).find(|w| target(w[0] as usize) == target(w[1] as usize)) {
+            let (first, second) = (w[0] as usize / 3, w[1] as usize / 3);
+            return Err(TriMeshError::NonManifoldEdge { from: v as u32, to: target(w[0] as usize), first, second });
         }
     }
-    Ok(twin)
+    let twin = (0..origin.len()).map(|h| {
+        let b = target(h) as usize;
+        let at_end = &out[first[b] as usize..first[b + 1] as usize];
+        at_end.binary_search_by_key(&origin[h], |&g| target(g as usize)).map_or(NONE, |i| at_end[i])
+    });
+    Ok(twin.collect())
 }
 
 #[cfg(test)]
@@ -464,6 +466,16 @@ mod tests {
         assert!(m.vertices().all(|v| m.is_boundary_vertex(v)));
         assert_eq!(m.outgoing(VertexId(0)).count(), 2);
         assert_eq!(m.edges().filter(|&e| m.is_boundary_edge(e)).count(), 4);
+    }
+
+    #[test]
+    fn a_vertex_may_have_any_valence() {
+        // A disc of 200 000 triangles round one vertex; anything quadratic in the valence would not end.
+        let n = 200_000u32;
+        let rim = (0..n).map(|i| DVec3::new(f64::from(i).cos(), f64::from(i).sin(), 0.0));
+        let faces: Vec<[u32; 3]> = (0..n).map(|i| [0, i + 1, (i + 1) % n + 1]).collect();
+        let m = TriMesh::from_faces(std::iter::once(DVec3::ZERO).chain(rim).collect(), &faces).unwrap();
+        assert_eq!((m.outgoing(VertexId(0)).count(), m.euler_characteristic()), (n as usize, 1));
     }
 
     #[test]

@@ -3,6 +3,20 @@
 //! The room for everything that is known of a surface before any geometry processing. It may use nothing
 //! else of this crate.
 
+mod builtin;
+mod features;
 mod kernel;
+mod load;
+mod read;
+mod repair;
+mod topology;
+mod triangulate;
+mod write;
 
+pub use builtin::{builtin, builtin_names};
+pub use features::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edges};
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
+pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};
+pub use repair::Repair;
+pub use topology::{Component, Topology};
+pub use write::{write_mesh_obj, write_obj};

@@ -1,7 +1,15 @@
 //! A checked mesh made ready for geometry processing, and the curves that are drawn on it.
 
+mod curvature;
 mod curve;
+mod index;
+mod path;
 mod point;
+mod relax;
 
+pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
+pub use index::SurfaceIndex;
+pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
+pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};

@@ -1,0 +1,278 @@
+//! Loops proposed at a point: the cheapest, and alternatives in order of cost.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use super::graph::{ElasticaGraph, State};
+use super::mask::DirectionMask;
+use super::search::{LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
+use crate::mesh::{TriMesh, VertexId};
+use crate::progress::{Cancelled, Progress};
+use crate::surface::SurfaceCurve;
+
+/// Two routes are one if one keeps within the separation of the other and their lengths differ by less than this
+/// factor: then neither leaves out what the other goes round.
+const SAME_LENGTH: f64 = 1.3;
+
+/// What loops are wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct ProposalQuery<'a> {
+    /// The vertex they pass.
+    pub vertex: VertexId,
+    /// The direction they pass it in: then only the cheapest loop along the geodesic nearest to this direction is
+    /// returned. Without, all directions compete.
+    pub direction: Option<DVec3>,
+    /// Directions that are closed.
+    pub mask: &'a DirectionMask,
+    /// Alternatives may cost up to this multiple of the cheapest loop; 1 asks for the cheapest only, which is faster.
+    pub factor: f64,
+    /// Most loops returned.
+    pub max: usize,
+    /// Alternatives keep this distance somewhere from every cheaper loop (in mesh units, measured along edges).
+    pub separation: f64,
+    /// Most search states to settle before the best so far is returned unproved. A state takes about half a
+    /// microsecond.
+    pub budget: u64,
+}
+
+impl<'a> ProposalQuery<'a> {
+    /// The cheapest loop through a vertex, proved within about a second on ordinary meshes.
+    pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
+        Self { vertex, direction: None, mask, factor: 1.0, max: 1, separation: 0.05, budget: 4_000_000 }
+    }
+
+    /// The cheapest loop and up to 15 alternatives that cost at most half as much again.
+    pub fn alternatives(vertex: VertexId, mask: &'a DirectionMask) -> Self {
+        Self { factor: 1.5, max: 16, budget: 20_000_000, ..Self::cheapest(vertex, mask) }
+    }
+}
+
+/// A loop, or on open surfaces a curve from boundary to boundary, with its cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundLoop {
+    /// The curve on the mesh of the graph.
+    pub curve: SurfaceCurve,
+    /// Total cost, the sum of the following three; a length for a surface of diagonal 1.
+    pub cost: f64,
+    /// Length.
+    pub length: f64,
+    /// Weighted alignment cost.
+    pub alignment: f64,
+    /// Weighted squared geodesic curvature.
+    pub bending: f64,
+    /// The vertices passed, joined by straight geodesics. A loop starts at the vertex asked for and does not repeat
+    /// it; an open curve starts and ends on the boundary.
+    pub path: Vec<VertexId>,
+}
+
+/// Loops through a vertex, cheapest first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposals {
+    /// The loops.
+    pub loops: Vec<FoundLoop>,
+    /// Whether the first is proved to be the cheapest and no alternative is missing; false if the budget was spent.
+    pub proved: bool,
+    /// Search states settled.
+    pub settled: u64,
+}
+
+impl ElasticaGraph {
+    /// The loops that `query` asks for. The result depends on nothing but the graph and the query.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn proposals(
+        &self,
+        query: &ProposalQuery,
+        work: &mut SearchWorkspace,
+        progress: &Progress,
+    ) -> Result<Proposals, Cancelled> {
+        self.proposals_with(query, work, progress, |_| {})
+    }
+
+    /// Like [`Self::proposals`], and hands the first loop found to `first` before it is proved to be the cheapest.
+    /// Usually it is, or costs a few percent more.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn proposals_with(
+        &self,
+        query: &ProposalQuery,
+        work: &mut SearchWorkspace,
+        progress: &Progress,
+        first: impl FnMut(&FoundLoop),
+    ) -> Result<Proposals, Cancelled> {
+        work.prepare(self, query.mask, progress)?;
+        let mut search = LoopSearch {
+            graph: self,
+            mask: query.mask,
+            work,
+            meter: Meter { progress, budget: query.budget, settled: 0 },
+            vertex: query.vertex,
+            factor: query.factor.max(1.0) as f32,
+        };
+        let mut routes = Vec::new();
+        let outcome = match query.direction {
+            Some(direction) => search.along(direction, &mut routes),
+            None => search.all(&mut routes, first),
+        };
+        let proved = match outcome {
+            Ok(()) => true,
+            Err(Stop::Spent) => false,
+            Err(Stop::Cancelled) => return Err(Cancelled),
+        };
+        let settled = search.meter.settled;
+        Ok(Proposals { loops: self.distinct(routes, query), proved, settled })
+    }
+
+    /// The cheapest of `routes` that are curves and not copies of one another.
+    fn distinct(&self, mut routes: Vec<Route>, query: &ProposalQuery) -> Vec<FoundLoop> {
+        routes.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.states.cmp(&b.states)));
+        let Some(limit) = routes.first().map(|r| r.cost * query.factor.max(1.0) as f32 * ROUNDING) else {
+            return Vec::new();
+        };
+        let mut found: Vec<(FoundLoop, Tube)> = Vec::new();
+        for route in routes.iter().take_while(|r| r.cost <= limit) {
+            if found.len() >= query.max {
+                break;
+            }
+            let known = |l: &FoundLoop, tube: &Tube| {
+                let ratio = self.parts(route)[0] / l.length;
+                (1.0 / SAME_LENGTH..SAME_LENGTH).contains(&ratio)
+                    && l.curve.closed == route.closed
+                    && route.states.iter().all(|&e| tube.contains(self.origin(e)))
+            };
+            if found.iter().any(|(l, tube)| known(l, tube)) {
+                continue;
+            }
+            if let Some(curve) = self.found(route) {
+                let tube = Tube::new(&self.mesh, &curve.curve, query.separation);
+                found.push((curve, tube));
+            }
+        }
+        found.into_iter().map(|(l, _)| l).collect()
+    }
+
+    /// Length, alignment and bending of a route.
+    fn parts(&self, route: &Route) -> [f64; 3] {
+        let s = &route.states;
+        let mut sum = [0.0; 3];
+        let mut add = |parts: [f32; 3]| sum.iter_mut().zip(parts).for_each(|(s, p)| *s += f64::from(p));
+        for pair in s.windows(2) {
+            add(self.step_parts(pair[0], pair[1]));
+        }
+        if let (Some(&start), Some(&end)) = (s.first(), s.last()) {
+            if route.closed {
+                add(self.step_parts(end, start));
+            } else {
+                add(self.half_parts(start));
+                add(self.half_parts(end));
+            }
+        }
+        sum
+    }
+
+    pub(super) fn found(&self, route: &Route) -> Option<FoundLoop> {
+        let curve = self.curve(route)?;
+        let [length, alignment, bending] = self.parts(route);
+        let mut path: Vec<VertexId> = route.states.iter().map(|&e| self.origin(e)).collect();
+        if let Some(&last) = route.states.last().filter(|_| !route.closed) {
+            path.push(VertexId(self.target[last as usize]));
+        }
+        Some(FoundLoop { curve, cost: length + alignment + bending, length, alignment, bending, path })
+    }
+}
+
+impl LoopSearch<'_> {
+    /// The cheapest loop along the state nearest to `direction`.
+    fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
+        let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
+        let open = self.work.boundary.as_ref().and_then(|b| b.through(self.graph, self.vertex, a));
+        let limit = open.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        routes.extend(open);
+        routes.extend(self.both_ways(a, limit)?);
+        Ok(())
+    }
+
+    /// The cheapest route, and those of the other start directions up to the factor.
+    pub(super) fn all(&mut self, routes: &mut Vec<Route>, mut first: impl FnMut(&FoundLoop)) -> Result<(), Stop> {
+        if let Some(boundary) = &self.work.boundary {
+            let out = self.graph.leaving(self.vertex).filter(|&a| self.mask.is_open(a));
+            routes.extend(out.filter_map(|a| boundary.through(self.graph, self.vertex, a)));
+        }
+        let mut best = routes.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+        let ball = self.ball(&mut best);
+        if let Some(route) = &best {
+            if let Some(l) = self.graph.found(route) {
+                first(&l);
+            }
+            routes.push(route.clone());
+        }
+        ball?;
+        let mut cost = best.map_or(f32::INFINITY, |r| r.cost);
+        self.corridor(cost * self.slack())?;
+        let directions = self.directions(cost * self.slack());
+        let known = routes.len();
+        self.improve(&directions, &mut cost, routes)?;
+        if self.factor > 1.0 {
+            let limit = cost * self.slack();
+            // What was found on the way is the cheapest of its direction; the routes before need not be.
+            let solved = |a: State| routes[known..].iter().any(|r| r.states[0] == a);
+            let rest = directions.iter().filter(|&&(bound, a)| bound < limit && !solved(a)).map(|d| d.1).collect();
+            self.alternatives(rest, limit, routes)?;
+        }
+        Ok(())
+    }
+
+    /// The factor, with room for rounding where costs up to it are wanted.
+    fn slack(&self) -> f32 {
+        if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
+    }
+}
+
+/// The vertices near a curve.
+struct Tube {
+    near: Vec<u64>,
+}
+
+impl Tube {
+    /// The vertices within `radius` of the edges `curve` crosses, measured along edges.
+    fn new(mesh: &TriMesh, curve: &SurfaceCurve, radius: f64) -> Self {
+        let mut dist = vec![f64::INFINITY; mesh.n_vertices()];
+        let mut queue = BinaryHeap::new();
+        for c in &curve.crossings {
+            for v in [mesh.origin(c.halfedge), mesh.target(c.halfedge)] {
+                dist[v.index()] = 0.0;
+                queue.push(Reverse((0u64, v)));
+            }
+        }
+        while let Some(Reverse((key, v))) = queue.pop() {
+            let d = f64::from_bits(key);
+            if d > dist[v.index()] {
+                continue;
+            }
+            for h in mesh.outgoing(v) {
+                for (w, side) in [(mesh.target(h), h), (mesh.opposite(h), mesh.prev(h))] {
+                    let reached = d + mesh.vector(side).length();
+                    if reached < dist[w.index()] && reached <= radius {
+                        dist[w.index()] = reached;
+                        queue.push(Reverse((reached.to_bits(), w)));
+                    }
+                }
+            }
+        }
+        let mut near = vec![0u64; mesh.n_vertices().div_ceil(64)];
+        for (v, _) in dist.iter().enumerate().filter(|(_, d)| d.is_finite()) {
+            near[v / 64] |= 1 << (v % 64);
+        }
+        Self { near }
+    }
+
+    fn contains(&self, v: VertexId) -> bool {
+        self.near[v.index() / 64] >> (v.index() % 64) & 1 == 1
+    }
+}

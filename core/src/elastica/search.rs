@@ -1,0 +1,341 @@
+//! The exact search for the cheapest loops through a vertex.
+//!
+//! 1. *Ball*: Dijkstra from all states leaving `v` at once, each label remembering its origin. Where the way out
+//!    of one origin meets the reversed way out of another, both together are a loop, with a corner at `v`. If the
+//!    corner is a turn that is allowed, the loop is real and an upper bound. A loop of cost `C` splits into two
+//!    parts below `C/2`, so the ball needs half the bound as radius.
+//! 2. *Corridor*: beyond that radius only states are continued from which the way back is known and the whole
+//!    stays below the bound. Now `D(rev e)` is the exact cheapest way from `e` back to `v`, in any direction, for
+//!    each state that can lie on a loop below the bound.
+//! 3. *Stars* ([`super::stars`]): for each start direction that can still matter an A* search with that potential
+//!    finds the cheapest loop in that direction, up to the bound.
+//!
+//! Reversal symmetry of the prices carries 1 and 2: one field from `v` serves both ways.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::sync::Mutex;
+
+use super::boundary::BoundaryField;
+use super::graph::{ElasticaGraph, NO_STATE, State};
+use super::mask::DirectionMask;
+use super::stars::Fan;
+use crate::mesh::VertexId;
+use crate::progress::{Cancelled, Progress};
+
+/// Sums of the same prices in another order differ in their last bits; bounds give way by this much.
+pub(super) const ROUNDING: f32 = 1.0 + 1e-5;
+
+/// States settled between two looks at the wish to stop: some tenths of a millisecond.
+const CHECK_EVERY: u64 = 1024;
+
+/// What is known of a state in one search.
+#[derive(Debug, Clone, Copy, Default)]
+struct Label {
+    dist: f32,
+    /// The search this label belongs to; labels of earlier searches do not exist.
+    stamp: u32,
+    parent: State,
+    /// Index among the states leaving the source; with several legs, the leg of the parent.
+    origin: u16,
+    settled: bool,
+}
+
+/// Tentative distances of one search, with its queue.
+#[derive(Debug, Default)]
+pub(super) struct Field {
+    labels: Vec<Label>,
+    stamp: u32,
+    /// Key as bits, which order like non-negative numbers, above the state.
+    queue: BinaryHeap<Reverse<u64>>,
+}
+
+impl Field {
+    /// Forgets everything, without touching it.
+    pub(super) fn restart(&mut self, n_states: usize) {
+        self.queue.clear();
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.labels.len() != n_states || self.stamp == 0 {
+            self.labels.clear();
+            self.labels.resize(n_states, Label::default());
+            self.stamp = 1;
+        }
+    }
+
+    #[inline]
+    fn get(&self, e: State) -> Option<&Label> {
+        let label = &self.labels[e as usize];
+        (label.stamp == self.stamp).then_some(label)
+    }
+
+    /// Tentative distance, infinite where none is known.
+    #[inline]
+    pub(super) fn dist(&self, e: State) -> f32 {
+        self.get(e).map_or(f32::INFINITY, |l| l.dist)
+    }
+
+    /// Final distance, infinite where none is known.
+    #[inline]
+    pub(super) fn settled(&self, e: State) -> f32 {
+        self.get(e).filter(|l| l.settled).map_or(f32::INFINITY, |l| l.dist)
+    }
+
+    #[inline]
+    pub(super) fn set(&mut self, e: State, dist: f32, parent: State, origin: u16) {
+        self.labels[e as usize] = Label { dist, stamp: self.stamp, parent, origin, settled: false };
+    }
+
+    #[inline]
+    pub(super) fn push(&mut self, key: f32, e: State) {
+        self.queue.push(Reverse(u64::from(key.to_bits()) << 32 | u64::from(e)));
+    }
+
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<(f32, State)> {
+        self.queue.pop().map(|Reverse(k)| (f32::from_bits((k >> 32) as u32), k as State))
+    }
+
+    /// Smallest key in the queue, infinite if it is empty.
+    #[inline]
+    pub(super) fn top(&self) -> f32 {
+        self.queue.peek().map_or(f32::INFINITY, |Reverse(k)| f32::from_bits((k >> 32) as u32))
+    }
+
+    /// Marks a state popped at distance `d` as final; false if that entry is out of date.
+    #[inline]
+    pub(super) fn settle(&mut self, d: f32, e: State) -> bool {
+        let label = &mut self.labels[e as usize];
+        let fresh = !label.settled && d <= label.dist;
+        label.settled |= fresh;
+        fresh
+    }
+
+    /// The next state that was not expanded since it was last set, marked as expanded.
+    #[inline]
+    pub(super) fn pop_fresh(&mut self) -> Option<(f32, State)> {
+        loop {
+            let (key, e) = self.pop()?;
+            let label = &mut self.labels[e as usize];
+            if !label.settled {
+                label.settled = true;
+                return Some((key, e));
+            }
+        }
+    }
+
+    /// The state before `e`, and the tag it was set with.
+    pub(super) fn parent(&self, e: State) -> (State, u16) {
+        let label = &self.labels[e as usize];
+        (label.parent, label.origin)
+    }
+
+    /// The states from the source to `e`.
+    pub(super) fn chain(&self, e: State) -> Vec<State> {
+        let mut list: Vec<State> =
+            std::iter::successors(Some(e), |&s| Some(self.labels[s as usize].parent).filter(|&p| p != NO_STATE))
+                .collect();
+        list.reverse();
+        list
+    }
+}
+
+/// Memory of searches, to be kept between them. It serves one graph at a time and is never cleared.
+#[derive(Debug, Default)]
+pub struct SearchWorkspace {
+    pub(super) root: Field,
+    /// The second front of a search from both ends.
+    pub(super) far: Field,
+    /// Per thread, for start directions that are searched at once.
+    pub(super) fans: Vec<Mutex<Fan>>,
+    meets: Vec<(State, State)>,
+    /// Per leg of a loop through anchors.
+    pub(super) home: Vec<Field>,
+    pub(super) ahead: Vec<Field>,
+    pub(super) boundary: Option<BoundaryField>,
+}
+
+impl SearchWorkspace {
+    /// An empty workspace; it grows with the first search.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+/// Why a search ended early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stop {
+    Cancelled,
+    /// The allowed number of states was settled.
+    Spent,
+}
+
+impl From<Cancelled> for Stop {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+/// A cycle of states, or an open sequence from boundary to boundary, with its price.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Route {
+    pub(super) cost: f32,
+    pub(super) states: Vec<State>,
+    pub(super) closed: bool,
+}
+
+/// Counts work and asks now and then whether to go on.
+#[derive(Debug)]
+pub(super) struct Meter<'a> {
+    pub(super) progress: &'a Progress,
+    pub(super) budget: u64,
+    pub(super) settled: u64,
+}
+
+impl Meter<'_> {
+    #[inline]
+    pub(super) fn tick(&mut self) -> Result<(), Stop> {
+        if self.settled >= self.budget {
+            return Err(Stop::Spent);
+        }
+        if self.settled.is_multiple_of(CHECK_EVERY) {
+            self.progress.check()?;
+        }
+        self.settled += 1;
+        Ok(())
+    }
+}
+
+/// One search for loops through one vertex.
+pub(super) struct LoopSearch<'a> {
+    pub(super) graph: &'a ElasticaGraph,
+    pub(super) mask: &'a DirectionMask,
+    pub(super) work: &'a mut SearchWorkspace,
+    pub(super) meter: Meter<'a>,
+    pub(super) vertex: VertexId,
+    /// Costs up to this multiple of the cheapest are wanted.
+    pub(super) factor: f32,
+}
+
+impl LoopSearch<'_> {
+    fn limit(&self, best: &Option<Route>) -> f32 {
+        best.as_ref().map_or(f32::INFINITY, |r| r.cost * self.factor)
+    }
+
+    /// Step 1; improves `best`.
+    pub(super) fn ball(&mut self, best: &mut Option<Route>) -> Result<(), Stop> {
+        let graph = self.graph;
+        let out = graph.leaving(self.vertex);
+        let first = out.start;
+        self.work.root.restart(graph.n_states());
+        self.work.meets.clear();
+        for a in out.filter(|&a| self.mask.is_open(a)) {
+            self.work.root.set(a, 0.0, NO_STATE, (a - first) as u16);
+            self.work.root.push(0.0, a);
+        }
+        let mut limit = self.limit(best);
+        while let Some((d, e)) = self.work.root.pop() {
+            if d >= 0.5 * limit {
+                break;
+            }
+            if !self.work.root.settle(d, e) {
+                continue;
+            }
+            self.meter.tick()?;
+            let origin = self.work.root.labels[e as usize].origin;
+            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
+                let reached = d + graph.step(e, f);
+                let back = graph.reverse[f as usize];
+                if let Some(&other) = self.work.root.get(back) {
+                    let total = reached + other.dist;
+                    if other.settled && total < limit {
+                        self.work.meets.push((e, f));
+                    }
+                    if total < best.as_ref().map_or(f32::INFINITY, |r| r.cost) {
+                        let (a, last) =
+                            (first + u32::from(origin), graph.reverse[(first + u32::from(other.origin)) as usize]);
+                        if graph.follows(last, a) {
+                            let cost = total + graph.step(last, a);
+                            if best.as_ref().is_none_or(|r| cost < r.cost) {
+                                *best = Some(Route { cost, states: self.joined(e, back), closed: true });
+                                limit = self.limit(best);
+                            }
+                        }
+                    }
+                }
+                if reached < 0.5 * limit && reached < self.work.root.dist(f) {
+                    self.work.root.set(f, reached, e, origin);
+                    self.work.root.push(reached, f);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The states from the source to `e`, and on along the reverse of the way to `back`.
+    fn joined(&self, e: State, back: State) -> Vec<State> {
+        let mut states = self.work.root.chain(e);
+        states.extend(self.work.root.chain(back).iter().rev().map(|&s| self.graph.reverse[s as usize]));
+        states
+    }
+
+    /// Step 2, for loops cheaper than `limit`.
+    pub(super) fn corridor(&mut self, limit: f32) -> Result<(), Stop> {
+        let graph = self.graph;
+        let root = &mut self.work.root;
+        root.queue.clear();
+        for &(e, f) in &self.work.meets {
+            let step = graph.step(e, f);
+            let (back_e, back_f) = (graph.reverse[e as usize], graph.reverse[f as usize]);
+            for (x, from, across) in [(f, e, back_f), (back_e, back_f, e)] {
+                let reached = root.dist(from) + step;
+                let settled = root.get(x).is_some_and(|l| l.settled);
+                if !settled && reached <= root.dist(x) && reached + root.settled(across) < limit {
+                    let origin = root.labels[from as usize].origin;
+                    root.set(x, reached, from, origin);
+                    root.push(reached, x);
+                }
+            }
+        }
+        while let Some((d, e)) = root.pop() {
+            if !root.settle(d, e) {
+                continue;
+            }
+            self.meter.tick()?;
+            let origin = root.labels[e as usize].origin;
+            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
+                let back = root.settled(graph.reverse[f as usize]);
+                let reached = d + graph.step(e, f);
+                // A settled state keeps its distance: another order of summing must not open it again.
+                if reached + back < limit && reached < root.dist(f) && !root.get(f).is_some_and(|l| l.settled) {
+                    root.set(f, reached, e, origin);
+                    root.push(reached, f);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The start directions that can lie on a loop cheaper than `limit`, each with a lower bound, cheapest first.
+    pub(super) fn directions(&self, limit: f32) -> Vec<(f32, State)> {
+        let graph = self.graph;
+        let root = &self.work.root;
+        let out = graph.leaving(self.vertex);
+        let home = |a: State| root.settled(graph.reverse[a as usize]);
+        let mut list: Vec<(f32, State)> = out
+            .clone()
+            .filter(|&a| self.mask.is_open(a))
+            .map(|a| {
+                // The loop comes back along some `rev b` that turns into `a`; it is also a loop through `b`.
+                let closing = out
+                    .clone()
+                    .filter(|&b| graph.follows(graph.reverse[b as usize], a))
+                    .map(|b| home(a).max(home(b)) + graph.step(graph.reverse[b as usize], a))
+                    .fold(f32::INFINITY, f32::min);
+                (closing, a)
+            })
+            .filter(|&(bound, _)| bound < limit)
+            .collect();
+        list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        list
+    }
+}

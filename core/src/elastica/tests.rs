@@ -1,0 +1,519 @@
+//! The search against plain Dijkstra, and the curves it returns, on generated and on real meshes.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::graph::State;
+use super::search::{LoopSearch, Meter, ROUNDING, Route};
+use super::*;
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::progress::Progress;
+use crate::surface::principal_curvature;
+
+/// Scales to bounding-box diagonal 1, as loading does.
+fn normalised(points: Vec<DVec3>, faces: &[[u32; 3]]) -> TriMesh {
+    let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let scale = 1.0 / low.distance(high);
+    TriMesh::from_faces(points.iter().map(|p| (*p - low) * scale).collect(), faces).unwrap()
+}
+
+/// A torus of `n` by `m` quads, each cut in two.
+fn torus(n: u32, m: u32) -> TriMesh {
+    let point = |i: u32, j: u32| {
+        let (a, b) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(m));
+        let (a, b) = (a * std::f64::consts::TAU, b * std::f64::consts::TAU);
+        let r = 1.0 + 0.4 * b.cos();
+        DVec3::new(r * a.cos(), r * a.sin(), 0.4 * b.sin())
+    };
+    let id = |i: u32, j: u32| (i % n) * m + j % m;
+    let points = (0..n * m).map(|k| point(k / m, k % m)).collect();
+    let faces: Vec<[u32; 3]> = (0..n * m)
+        .flat_map(|k| {
+            let (i, j) = (k / m, k % m);
+            let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    normalised(points, &faces)
+}
+
+/// An open tube with a waist, of `n` by `m` quads.
+fn tube(n: u32, m: u32) -> TriMesh {
+    let point = |i: u32, j: u32| {
+        let (a, z) = (f64::from(i) / f64::from(n) * std::f64::consts::TAU, f64::from(j) / f64::from(m) - 0.5);
+        let r = 0.2 + z * z;
+        DVec3::new(r * a.cos(), r * a.sin(), 2.0 * z)
+    };
+    let id = |i: u32, j: u32| (i % n) * (m + 1) + j;
+    let points = (0..n * (m + 1)).map(|k| point(k / (m + 1), k % (m + 1))).collect();
+    let faces: Vec<[u32; 3]> = (0..n * m)
+        .flat_map(|k| {
+            let (i, j) = (k / m, k % m);
+            let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    normalised(points, &faces)
+}
+
+/// An octahedron, subdivided `levels` times and drawn out to an ellipsoid.
+fn ellipsoid(levels: u32, radii: DVec3) -> TriMesh {
+    let mut points = vec![DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    let mut faces: Vec<[u32; 3]> = (0..4).flat_map(|i| [[i, (i + 1) % 4, 4], [(i + 1) % 4, i, 5]]).collect();
+    for _ in 0..levels {
+        let mut middle = std::collections::BTreeMap::new();
+        let mut at = |a: u32, b: u32| {
+            *middle.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                points.push((points[a as usize] + points[b as usize]).normalize());
+                points.len() as u32 - 1
+            })
+        };
+        faces = faces
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (x, y, z) = (at(a, b), at(b, c), at(c, a));
+                [[a, x, z], [x, b, y], [z, y, c], [x, y, z]]
+            })
+            .collect();
+    }
+    normalised(points.iter().map(|p| *p * radii).collect(), &faces)
+}
+
+/// A mesh of the test folder, if that is there.
+fn real(name: &str) -> Option<TriMesh> {
+    let folder = std::env::var_os("PLAIT_MESHES")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"), PathBuf::from);
+    let Ok(text) = std::fs::read_to_string(folder.join(name)) else {
+        eprintln!("skipped: no {name} in {}", folder.display());
+        return None;
+    };
+    let off = name.ends_with(".off");
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    let lines = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#') && *l != "OFF");
+    let mut n_points = None;
+    for line in lines {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let number = |i: usize| words[i].parse::<f64>().unwrap();
+        let index = |i: usize, base: u32| words[i].split('/').next().unwrap().parse::<u32>().unwrap() - base;
+        match (off, n_points) {
+            (true, None) => n_points = Some(number(0) as usize),
+            (true, Some(n)) if points.len() < n => points.push(DVec3::new(number(0), number(1), number(2))),
+            (true, Some(_)) => faces.push([index(1, 0), index(2, 0), index(3, 0)]),
+            _ if words[0] == "v" => points.push(DVec3::new(number(1), number(2), number(3))),
+            _ if words[0] == "f" => faces.push([index(1, 1), index(2, 1), index(3, 1)]),
+            _ => {}
+        }
+    }
+    Some(normalised(points, &faces))
+}
+
+fn sharp_edges(mesh: &TriMesh, degrees: f64) -> Vec<bool> {
+    let normal = |h| mesh.face_normal(mesh.face(h));
+    mesh.edges()
+        .map(|e| {
+            let h = mesh.halfedge(e);
+            mesh.twin(h).is_some_and(|t| normal(h).dot(normal(t)) < degrees.to_radians().cos())
+        })
+        .collect()
+}
+
+fn graph_with(mesh: TriMesh, options: &ElasticaOptions) -> ElasticaGraph {
+    let sharp = sharp_edges(&mesh, 50.0);
+    let curvature = principal_curvature(&mesh, 0.03, &sharp);
+    ElasticaGraph::build(Arc::new(mesh), &curvature, &sharp, options, &Progress::new()).unwrap()
+}
+
+fn graph(mesh: TriMesh) -> ElasticaGraph {
+    graph_with(mesh, &ElasticaOptions::default())
+}
+
+/// Some vertices, spread over the mesh.
+fn sample(graph: &ElasticaGraph, count: usize) -> impl Iterator<Item = VertexId> + use<> {
+    let n = graph.mesh().n_vertices();
+    (0..count.min(n)).map(move |i| VertexId::new((i * 7919 + 13) % n))
+}
+
+fn price(graph: &ElasticaGraph, route: &Route) -> f32 {
+    let s = &route.states;
+    let inner: f32 = s.windows(2).map(|w| graph.step(w[0], w[1])).sum();
+    assert!(s.windows(2).all(|w| graph.follows(w[0], w[1])));
+    assert!(graph.follows(*s.last().unwrap(), s[0]));
+    inner + graph.step(*s.last().unwrap(), s[0])
+}
+
+/// Plain Dijkstra over all of `g′` from the successors of `a` back to `a`.
+fn reference(graph: &ElasticaGraph, mask: &DirectionMask, a: State) -> f32 {
+    let mut dist = vec![f32::INFINITY; graph.n_states()];
+    let mut queue = BinaryHeap::new();
+    let mut from = Some((0.0, a));
+    while let Some((d, e)) = from {
+        for f in graph.successors(e).filter(|&f| mask.is_open(f)) {
+            let reached = d + graph.step(e, f);
+            if reached < dist[f as usize] {
+                dist[f as usize] = reached;
+                queue.push(Reverse((reached.to_bits(), f)));
+            }
+        }
+        from = loop {
+            match queue.pop() {
+                Some(Reverse((key, e))) if f32::from_bits(key) <= dist[e as usize] => {
+                    break Some((f32::from_bits(key), e)).filter(|_| e != a);
+                }
+                Some(_) => {}
+                None => break None,
+            }
+        };
+    }
+    dist[a as usize]
+}
+
+/// Compares all routes up to `factor` with the reference in every direction; returns how many were compared.
+fn compare(graph: &ElasticaGraph, mask: &DirectionMask, v: VertexId, factor: f32) -> usize {
+    let progress = Progress::new();
+    let mut work = SearchWorkspace::new();
+    let mut search = LoopSearch {
+        graph,
+        mask,
+        work: &mut work,
+        meter: Meter { progress: &progress, budget: u64::MAX, settled: 0 },
+        vertex: v,
+        factor,
+    };
+    let mut routes = Vec::new();
+    search.all(&mut routes, |_| {}).unwrap();
+    let out: Vec<State> = graph.leaving(v).filter(|&a| mask.is_open(a)).collect();
+    let expected: Vec<f32> = out.iter().map(|&a| reference(graph, mask, a)).collect();
+    let near = |a: f32, b: f32| (a - b).abs() <= 1e-4 * b;
+    for r in &routes {
+        assert!(near(price(graph, r), r.cost), "{v:?}: {} for {}", r.cost, price(graph, r));
+    }
+    let best = routes.iter().map(|r| r.cost).fold(f32::INFINITY, f32::min);
+    let best_expected = expected.iter().copied().fold(f32::INFINITY, f32::min);
+    assert!(best == best_expected || near(best, best_expected), "{v:?}: {best}, expected {best_expected}");
+    let mut compared = 1;
+    if factor > 1.0 {
+        for (&a, &cost) in out.iter().zip(&expected).filter(|(_, c)| **c < best * factor / ROUNDING) {
+            let here = routes.iter().filter(|r| r.states[0] == a).map(|r| r.cost).fold(f32::INFINITY, f32::min);
+            assert!(near(here, cost), "{v:?} along {a}: {here}, expected {cost}");
+            compared += 1;
+        }
+    }
+    compared
+}
+
+fn compare_some(graph: &ElasticaGraph, count: usize) {
+    let open = DirectionMask::none();
+    let mut compared = 0;
+    for v in sample(graph, count) {
+        compared += compare(graph, &open, v, 1.0) + compare(graph, &open, v, 1.5);
+    }
+    assert!(compared > count);
+}
+
+#[test]
+fn the_search_is_exact_on_generated_meshes() {
+    compare_some(&graph(torus(24, 12)), 4);
+    compare_some(&graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5))), 3);
+}
+
+#[test]
+fn the_search_is_exact_on_real_meshes() {
+    for (name, count) in [("od_cube.obj", 8), ("torus_1k.obj", 3), ("rockerarm_1k.off", 3)] {
+        if let Some(mesh) = real(name) {
+            compare_some(&graph(mesh), count);
+        }
+    }
+}
+
+#[test]
+fn the_search_is_exact_around_closed_directions() {
+    let g = graph(torus(24, 12));
+    let v = VertexId(13);
+    let mut mask = DirectionMask::none();
+    let before =
+        g.proposals(&ProposalQuery::cheapest(v, &mask), &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+    let curve = &before.loops[0].curve;
+    let n = curve.crossings.len();
+    for i in 0..n {
+        let along = curve.point(g.mesh(), i) - curve.point(g.mesh(), (i + n - 1) % n);
+        g.disable_near(&mut mask, curve.face_before(g.mesh(), i).unwrap(), along, 45f64.to_radians());
+    }
+    assert!(mask.n_closed() > 0);
+    compare(&g, &mask, v, 1.0);
+    compare(&g, &mask, v, 1.5);
+    let after = g.proposals(&ProposalQuery::cheapest(v, &mask), &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+    assert!(after.loops[0].cost > before.loops[0].cost);
+}
+
+#[test]
+fn one_direction_is_searched_exactly() {
+    let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
+    let open = DirectionMask::none();
+    let mut work = SearchWorkspace::new();
+    for v in sample(&g, 3) {
+        for a in g.leaving(v).step_by(9) {
+            let query = ProposalQuery { direction: Some(g.departure(a)), ..ProposalQuery::cheapest(v, &open) };
+            let found = g.proposals(&query, &mut work, &Progress::new()).unwrap();
+            let expected = f64::from(reference(&g, &open, a));
+            assert!(found.proved && (found.loops[0].cost - expected).abs() < 1e-4 * expected);
+        }
+    }
+}
+
+#[test]
+fn prices_are_symmetric_to_the_last_bit() {
+    let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
+    for e in 0..g.n_states() as State {
+        let back = g.reverse[e as usize];
+        assert_eq!(g.reverse[back as usize], e);
+        for f in g.successors(e) {
+            let turned = g.reverse[f as usize];
+            assert_eq!(g.step(e, f).to_bits(), g.step(turned, back).to_bits());
+            assert!(g.successors(turned).any(|s| s == back));
+            assert!(g.follows(e, f));
+        }
+        assert_eq!(
+            g.successors(e).count(),
+            g.leaving(VertexId(g.target[e as usize])).filter(|&f| g.follows(e, f)).count()
+        );
+    }
+}
+
+#[test]
+fn the_cheapest_loop_of_a_torus_is_a_meridian_circle() {
+    let g = graph(torus(48, 24));
+    let mask = DirectionMask::none();
+    let found =
+        g.proposals(&ProposalQuery::alternatives(VertexId(5), &mask), &mut SearchWorkspace::new(), &Progress::new());
+    let found = found.unwrap();
+    // Tube radius over the diagonal of the box.
+    let radius = 0.4 / 2.8f64.hypot(2.8).hypot(0.8);
+    let best = &found.loops[0];
+    assert!(found.proved && best.curve.closed);
+    assert!((best.length - radius * std::f64::consts::TAU).abs() < 0.02 * best.length, "{}", best.length);
+    assert!(best.bending < 0.01 * best.length);
+    assert!(found.loops.windows(2).all(|w| w[0].cost <= w[1].cost));
+}
+
+#[test]
+fn open_curves_compete_with_loops() {
+    let g = graph(tube(24, 40));
+    let mask = DirectionMask::none();
+    let v = VertexId(20);
+    let query = ProposalQuery { factor: 20.0, max: 100, ..ProposalQuery::alternatives(v, &mask) };
+    let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+    assert!(found.loops.iter().any(|l| l.curve.closed) && found.loops.iter().any(|l| !l.curve.closed));
+    for l in &found.loops {
+        assert_eq!(l.curve.check(g.mesh()), Ok(()));
+        assert!(l.path.contains(&v));
+        if !l.curve.closed {
+            assert!([l.path[0], *l.path.last().unwrap()].iter().all(|&w| g.mesh().is_boundary_vertex(w)));
+        }
+    }
+}
+
+#[test]
+fn every_loop_is_a_curve() {
+    let names = [
+        "od_cube.obj",
+        "torus_1k.obj",
+        "half_torus.obj",
+        "chipped_torus.obj",
+        "vase_open.off",
+        "rockerarm_1k.off",
+        "bunny_1k.obj",
+        "cad_upright_slivers.off",
+        "meshlab_block.off",
+    ];
+    let progress = Progress::new();
+    for mesh in names.iter().filter_map(|n| Some((n, real(n)?))) {
+        let (name, g) = (mesh.0, graph(mesh.1));
+        let mask = DirectionMask::none();
+        let mut work = SearchWorkspace::new();
+        let (mut with, mut without) = (0, 0);
+        for v in sample(&g, 40) {
+            let query = ProposalQuery { budget: 300_000, ..ProposalQuery::alternatives(v, &mask) };
+            let found = g.proposals(&query, &mut work, &progress).unwrap();
+            for l in &found.loops {
+                assert_eq!(l.curve.check(g.mesh()), Ok(()), "{name} {v:?}");
+                assert!(l.cost.is_finite() && (l.cost - l.length - l.alignment - l.bending).abs() < 1e-9);
+            }
+            if found.loops.is_empty() { without += 1 } else { with += 1 }
+        }
+        assert!(with > 3 * without, "{name}: {without} vertices of {} without a loop", with + without);
+    }
+}
+
+#[test]
+fn a_spent_budget_is_told() {
+    let g = graph(torus(24, 12));
+    let mask = DirectionMask::none();
+    let query = ProposalQuery { budget: 10, ..ProposalQuery::cheapest(VertexId(3), &mask) };
+    let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+    assert!(!found.proved && found.settled == 10);
+    let stop = Progress::new();
+    stop.cancel();
+    let query = ProposalQuery::cheapest(VertexId(3), &mask);
+    assert!(g.proposals(&query, &mut SearchWorkspace::new(), &stop).is_err());
+    let built = ElasticaGraph::build(g.mesh().clone(), &[], &[], &ElasticaOptions::default(), &Progress::new());
+    assert!(matches!(built, Err(ElasticaError::WrongLength { given: 0, .. })));
+}
+
+#[test]
+fn the_middle_of_a_geodesic_lies_in_its_face() {
+    let g = graph(ellipsoid(2, DVec3::ONE));
+    let mut mask = DirectionMask::none();
+    for f in 0..g.mesh().n_faces() {
+        g.disable_near(&mut mask, FaceId::new(f), DVec3::X, std::f64::consts::FRAC_PI_2 + 1e-6);
+    }
+    assert_eq!(2 * mask.n_closed(), g.n_states());
+}
+
+/// Plain Dijkstra from `a` to every state, by at least one step.
+fn distances(graph: &ElasticaGraph, a: State) -> Vec<f32> {
+    let mut dist = vec![f32::INFINITY; graph.n_states()];
+    let mut queue = BinaryHeap::new();
+    let mut from = (0.0, a);
+    loop {
+        let (d, e) = from;
+        for f in graph.successors(e) {
+            let reached = d + graph.step(e, f);
+            if reached < dist[f as usize] {
+                dist[f as usize] = reached;
+                queue.push(Reverse((reached.to_bits(), f)));
+            }
+        }
+        let Some(Reverse((key, e))) = queue.pop() else { return dist };
+        from = (f32::from_bits(key).max(dist[e as usize]), e);
+    }
+}
+
+/// The cheapest round through the gates, by the metagraph of the source.
+fn reference_round(graph: &ElasticaGraph, gates: &[Vec<State>]) -> f32 {
+    let n = gates.len();
+    let table: Vec<Vec<Vec<f32>>> = (0..n)
+        .map(|i| {
+            let next = &gates[(i + 1) % n];
+            gates[i]
+                .iter()
+                .map(|&a| {
+                    let d = distances(graph, a);
+                    next.iter().map(|&b| d[b as usize]).collect()
+                })
+                .collect()
+        })
+        .collect();
+    let mut best = f32::INFINITY;
+    for x in 0..gates[0].len() {
+        let mut cost = vec![f32::INFINITY; gates[0].len()];
+        cost[x] = 0.0;
+        for leg in &table {
+            let to = leg[0].len();
+            cost = (0..to).map(|b| (0..leg.len()).map(|a| cost[a] + leg[a][b]).fold(f32::INFINITY, f32::min)).collect();
+        }
+        best = best.min(cost[x]);
+    }
+    best
+}
+
+#[test]
+fn loops_through_anchors_are_exact() {
+    let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
+    let mask = DirectionMask::none();
+    let mut work = SearchWorkspace::new();
+    let directed = |v: u32, d: DVec3| Anchor { vertex: VertexId(v), direction: Some(d) };
+    let free = |v: u32| Anchor { vertex: VertexId(v), direction: None };
+    let cases: [&[Anchor]; 5] = [
+        &[free(10)],
+        &[free(3), free(120)],
+        &[free(40), directed(200, DVec3::X)],
+        &[directed(40, DVec3::Y), directed(200, DVec3::Z), directed(77, DVec3::X)],
+        &[free(5), free(5)],
+    ];
+    for anchors in cases {
+        let gates: Vec<Vec<State>> = anchors
+            .iter()
+            .map(|a| match a.direction {
+                Some(d) => g.nearest(&mask, a.vertex, d).into_iter().collect(),
+                None => g.leaving(a.vertex).collect(),
+            })
+            .collect();
+        let expected = f64::from(reference_round(&g, &gates));
+        let query = AnchorQuery { anchors, mask: &mask, budget: u64::MAX };
+        let found = g.loop_through(&query, &mut work, &Progress::new()).unwrap();
+        assert!(found.proved);
+        let l = &found.loops[0];
+        assert!((l.cost - expected).abs() < 1e-4 * expected, "{anchors:?}: {}, expected {expected}", l.cost);
+        assert!(anchors.iter().all(|a| l.path.contains(&a.vertex)));
+        assert_eq!(l.path[0], anchors[0].vertex);
+        assert_eq!(l.curve.check(g.mesh()), Ok(()));
+    }
+}
+
+#[test]
+fn anchors_on_an_open_surface_can_be_passed_from_boundary_to_boundary() {
+    let g = graph(tube(24, 40));
+    let mask = DirectionMask::none();
+    let mut work = SearchWorkspace::new();
+    let anchors = [10, 20, 30].map(|i| Anchor { vertex: VertexId(i), direction: Some(DVec3::Z) });
+    let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
+    let l = &g.loop_through(&query, &mut work, &Progress::new()).unwrap().loops[0];
+    assert!(!l.curve.closed && anchors.iter().all(|a| l.path.contains(&a.vertex)));
+    assert_eq!(l.curve.check(g.mesh()), Ok(()));
+    assert!((l.cost - l.length).abs() < 0.05 * l.length, "{} of length {}", l.cost, l.length);
+}
+
+#[test]
+fn open_curves_are_exact() {
+    let mask = DirectionMask::none();
+    for mesh in [Some(tube(16, 24)), real("half_torus.obj")].into_iter().flatten() {
+        let g = graph(mesh);
+        let half = |e: State| g.half_parts(e).iter().sum::<f32>();
+        let ends = |e: State| g.mesh().is_boundary_vertex(VertexId(g.target[e as usize]));
+        let home = |a: State| {
+            let d = distances(&g, a);
+            let onwards = (0..g.n_states() as State).filter(|&e| ends(e)).map(|e| d[e as usize] + half(e));
+            onwards.fold(if ends(a) { half(a) } else { f32::INFINITY }, f32::min)
+        };
+        for v in sample(&g, 2).filter(|&v| !g.mesh().is_boundary_vertex(v)) {
+            let out = g.leaving(v);
+            let homes: Vec<f32> = out.clone().map(home).collect();
+            let pairs = out.clone().flat_map(|a| out.clone().map(move |b| (a, b)));
+            let expected = pairs
+                .filter(|&(a, b)| g.follows(g.reverse[b as usize], a))
+                .map(|(a, b)| {
+                    let at = |s: State| homes[(s - out.start) as usize];
+                    at(a) + at(b) + g.step(g.reverse[b as usize], a)
+                })
+                .fold(f32::INFINITY, f32::min);
+            let query =
+                ProposalQuery { factor: 100.0, max: 1000, separation: 0.0, ..ProposalQuery::alternatives(v, &mask) };
+            let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
+            let cheapest = found.loops.iter().find(|l| !l.curve.closed).unwrap();
+            assert!((cheapest.cost - f64::from(expected)).abs() < 1e-4 * cheapest.cost, "{} {expected}", cheapest.cost);
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let g = graph(torus(32, 16));
+            let mask = DirectionMask::none();
+            let mut work = SearchWorkspace::new();
+            let find = |v| {
+                let query = ProposalQuery { factor: 4.0, budget: 60_000, ..ProposalQuery::alternatives(v, &mask) };
+                g.proposals(&query, &mut work, &Progress::new()).unwrap()
+            };
+            sample(&g, 6).map(find).collect::<Vec<_>>()
+        })
+    };
+    assert_eq!(run(1), run(3));
+}

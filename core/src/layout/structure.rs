@@ -1,0 +1,212 @@
+//! The structure of a quad layout (Campen, sections 2.1 and 5.2.3).
+//!
+//! Dual to an arrangement: a node per region, an arc per segment, a patch per crossing. A segment that ends
+//! on the boundary separates two regions whose nodes lie on the boundary, and its arc runs along it.
+
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::dual::{Arrangement, SideKind};
+
+/// A node, dual to the region of the same index.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Node {
+    /// Number of patch corners that meet here.
+    pub valence: usize,
+    /// Whether it lies on the boundary of the surface.
+    pub boundary: bool,
+}
+
+impl Node {
+    /// Whether four patches meet here, or two on the boundary.
+    pub fn is_regular(&self) -> bool {
+        self.valence == if self.boundary { 2 } else { 4 }
+    }
+}
+
+/// An arc, dual to the segment of the same index.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Arc {
+    /// Its two nodes: of the region to the left of the segment and of the one to the right.
+    pub nodes: [u32; 2],
+    /// Whether it runs along the boundary of the surface.
+    pub boundary: bool,
+    /// The dual strip (class of opposite arcs) it belongs to; opposite arcs have equal length in every map.
+    pub chord: u32,
+}
+
+/// A patch, dual to the crossing of the same index.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Patch {
+    /// Its four corners, counter-clockwise.
+    pub corners: [u32; 4],
+    /// Its four sides as arc and "in the arc's direction"; side `i` joins corner `i` to corner `i + 1`.
+    pub sides: [(u32, bool); 4],
+}
+
+/// Why an arrangement has no dual quad layout, or a layout is not valid.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LayoutError {
+    /// Regions that are no nodes.
+    #[error("{} of the regions cannot be nodes yet (the first is region {})", .0.len(), .0[0])]
+    RedRegions(Vec<u32>),
+    /// There is no strip crossing at all.
+    #[error("no two strips cross: the layout has no patch")]
+    Empty,
+    /// Nodes, arcs and patches do not add up.
+    #[error("{nodes} nodes, {arcs} arcs and {patches} patches make an Euler characteristic of {found}, not {expected}")]
+    Euler {
+        /// Number of nodes.
+        nodes: usize,
+        /// Number of arcs.
+        arcs: usize,
+        /// Number of patches.
+        patches: usize,
+        /// Their alternating sum.
+        found: i64,
+        /// That of the surface.
+        expected: i64,
+    },
+    /// The sides of a patch do not join its corners.
+    #[error("the sides of patch {patch} do not join its corners")]
+    Patch {
+        /// The patch.
+        patch: usize,
+    },
+    /// A node's valence differs from the number of patch corners there.
+    #[error("node {node} has valence {valence}, but {corners} patch corners")]
+    Valence {
+        /// The node.
+        node: usize,
+        /// The valence noted.
+        valence: usize,
+        /// The corners found.
+        corners: usize,
+    },
+}
+
+/// A quad layout: nodes, arcs and four-sided patches.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct QuadLayout {
+    /// The nodes.
+    pub nodes: Vec<Node>,
+    /// The arcs.
+    pub arcs: Vec<Arc>,
+    /// The patches.
+    pub patches: Vec<Patch>,
+    /// Number of chords (dual strips).
+    pub chords: usize,
+}
+
+impl QuadLayout {
+    /// The layout dual to `arrangement`, whose `red` regions are given, on a surface of Euler characteristic
+    /// `euler`.
+    ///
+    /// # Errors
+    ///
+    /// [`LayoutError::RedRegions`] while there are any; anything else is a defect of the arrangement.
+    pub fn dual(arrangement: &Arrangement, red: &[u32], euler: i64) -> Result<Self, LayoutError> {
+        if !red.is_empty() {
+            return Err(LayoutError::RedRegions(red.to_vec()));
+        }
+        if arrangement.crossings.is_empty() {
+            return Err(LayoutError::Empty);
+        }
+        let nodes = arrangement
+            .regions
+            .iter()
+            .map(|r| Node { valence: r.corners(), boundary: r.boundary_stretches() > 0 })
+            .collect();
+        let mut arcs = vec![Arc { nodes: [u32::MAX; 2], boundary: false, chord: 0 }; arrangement.segments.len()];
+        for (r, region) in arrangement.regions.iter().enumerate() {
+            for side in region.borders.iter().flatten() {
+                if let SideKind::Segment { segment, forward } = side.kind {
+                    arcs[segment as usize].nodes[usize::from(!forward)] = r as u32;
+                }
+            }
+        }
+        for end in &arrangement.ends {
+            arcs[end.segment as usize].boundary = true;
+        }
+        let mut patches = Vec::with_capacity(arrangement.crossings.len());
+        for (p, crossing) in arrangement.crossings.iter().enumerate() {
+            let corners = crossing.spokes.map(|h| arrangement.region_left_of(h));
+            let mut sides = [(0, false); 4];
+            for (i, side) in sides.iter_mut().enumerate() {
+                let spoke = crossing.spokes[(i + 1) % 4];
+                let (segment, forward) = arrangement.segment_at(spoke).ok_or(LayoutError::Patch { patch: p })?;
+                // Counter-clockwise around the crossing one passes from the right of the spoke to its left.
+                *side = (segment, !forward);
+            }
+            patches.push(Patch { corners, sides });
+        }
+        let mut layout = Self { nodes, arcs, patches, chords: 0 };
+        layout.find_chords();
+        layout.check(euler)?;
+        Ok(layout)
+    }
+
+    /// Numbers the classes of opposite arcs.
+    fn find_chords(&mut self) {
+        let mut parent: Vec<u32> = (0..self.arcs.len() as u32).collect();
+        for p in &self.patches {
+            for i in 0..2 {
+                let (a, b) = (root(&mut parent, p.sides[i].0), root(&mut parent, p.sides[i + 2].0));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+        let mut number = vec![u32::MAX; parent.len()];
+        for a in 0..self.arcs.len() {
+            let r = root(&mut parent, a as u32) as usize;
+            if number[r] == u32::MAX {
+                number[r] = self.chords as u32;
+                self.chords += 1;
+            }
+            self.arcs[a].chord = number[r];
+        }
+    }
+
+    /// Checks the layout: every side joins its corners, valences agree, `|N| − |A| + |P| = χ`.
+    ///
+    /// # Errors
+    ///
+    /// The first violation.
+    pub fn check(&self, euler: i64) -> Result<(), LayoutError> {
+        let mut corners = vec![0; self.nodes.len()];
+        for (patch, p) in self.patches.iter().enumerate() {
+            for i in 0..4 {
+                corners[p.corners[i] as usize] += 1;
+                let (arc, forward) = p.sides[i];
+                let [a, b] = self.arcs[arc as usize].nodes;
+                let (from, to) = if forward { (a, b) } else { (b, a) };
+                if (from, to) != (p.corners[i], p.corners[(i + 1) % 4]) {
+                    return Err(LayoutError::Patch { patch });
+                }
+            }
+        }
+        for (node, (n, &corners)) in self.nodes.iter().zip(&corners).enumerate() {
+            if n.valence != corners {
+                return Err(LayoutError::Valence { node, valence: n.valence, corners });
+            }
+        }
+        let found = self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64;
+        if found != euler {
+            let (nodes, arcs, patches) = (self.nodes.len(), self.arcs.len(), self.patches.len());
+            return Err(LayoutError::Euler { nodes, arcs, patches, found, expected: euler });
+        }
+        Ok(())
+    }
+
+    /// Number of irregular nodes.
+    pub fn n_irregular(&self) -> usize {
+        self.nodes.iter().filter(|n| !n.is_regular()).count()
+    }
+}
+
+fn root(parent: &mut [u32], mut a: u32) -> u32 {
+    while parent[a as usize] != a {
+        parent[a as usize] = parent[parent[a as usize] as usize];
+        a = parent[a as usize];
+    }
+    a
+}

@@ -1,0 +1,8 @@
+//! Quad meshes: refining a layout, smoothing on the surface, quality.
+
+mod project;
+mod refine;
+mod smooth;
+
+pub use refine::{QuadMesh, chord_counts, refine};
+pub use smooth::{quality, scaled_jacobians, smooth};

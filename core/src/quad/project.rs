@@ -1,0 +1,88 @@
+//! Following a moving point on the surface.
+//!
+//! The nearest point of the whole surface may lie on the far side of a thin wall. A vertex that moves in small
+//! steps is instead followed from triangle to triangle, each nearer to it than the one before.
+
+use glam::DVec3;
+
+use crate::mesh::{FaceId, TriMesh};
+
+/// Triangles passed in one step at most; a step is about a quad long, and quads span a few triangles.
+const MAX_WALK: usize = 64;
+
+/// The locally nearest point of the surface to `p`, found by walking from triangle `start`.
+pub(super) fn follow(mesh: &TriMesh, p: DVec3, start: u32) -> (DVec3, u32) {
+    let mut face = FaceId(start);
+    let mut at = closest_in(mesh, face, p);
+    let mut distance = at.distance_squared(p);
+    for _ in 0..MAX_WALK {
+        let mut best = None;
+        for v in mesh.face_vertices(face) {
+            for h in mesh.outgoing(v) {
+                let g = mesh.face(h);
+                let q = closest_in(mesh, g, p);
+                let d = q.distance_squared(p);
+                if d < distance * (1.0 - 1e-9) {
+                    distance = d;
+                    best = Some((g, q));
+                }
+            }
+        }
+        let Some((g, q)) = best else { break };
+        (face, at) = (g, q);
+    }
+    (at, face.0)
+}
+
+/// The point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+fn closest_in(mesh: &TriMesh, f: FaceId, p: DVec3) -> DVec3 {
+    let [a, b, c] = mesh.face_vertices(f).map(|v| mesh.position(v));
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return a + ab * (d1 / (d1 - d3));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return a + ac * (d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let total = va + vb + vc;
+    if total > 0.0 { a + ab * (vb / total) + ac * (vc / total) } else { a }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::torus;
+
+    #[test]
+    fn walking_ends_at_the_nearest_point_nearby() {
+        let mesh = torus(40, 20);
+        for (k, f) in mesh.faces().enumerate().step_by(37) {
+            let [a, b, _] = mesh.face_vertices(f).map(|v| mesh.position(v));
+            let p = a + (b - a) * 1.7 + 0.01 * mesh.face_normal(f) * if k % 2 == 0 { 1.0 } else { -1.0 };
+            let (at, g) = follow(&mesh, p, f.0);
+            let best = mesh.faces().map(|g| closest_in(&mesh, g, p).distance(p)).fold(f64::MAX, f64::min);
+            assert!((at.distance(p) - best).abs() < 1e-12);
+            assert!(closest_in(&mesh, FaceId(g), p).distance(at) < 1e-12);
+        }
+    }
+}

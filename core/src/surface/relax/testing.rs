@@ -1,0 +1,226 @@
+//! Meshes and curves for the tests of this room.
+
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::surface::{Crossing, SurfaceCurve, VertexPath, geodesic_in};
+
+/// A small generator of numbers that look random (an LCG with the constants of Knuth's MMIX).
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in `[0, 1)`.
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        ((self.unit() * n as f64) as usize).min(n - 1)
+    }
+}
+
+/// A grid that closes in `i` and, where `wrap`, in `j`; `place` maps (i / nu, j / nv), shaken by `jitter` cells.
+fn grid(nu: usize, nv: usize, wrap: bool, jitter: f64, place: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let mut random = Random(7);
+    let rows = if wrap { nv } else { nv + 1 };
+    let mut positions = Vec::new();
+    for j in 0..rows {
+        for i in 0..nu {
+            let inner = wrap || (j > 0 && j < nv);
+            let mut shake = || (random.unit() - 0.5) * 2.0 * jitter;
+            let (du, dv) = (shake(), shake());
+            let v = j as f64 + if inner { dv } else { 0.0 };
+            positions.push(place((i as f64 + du) / nu as f64, v / nv as f64));
+        }
+    }
+    let mut faces = Vec::new();
+    for j in 0..nv {
+        for i in 0..nu {
+            let at = |i: usize, j: usize| ((j % rows) * nu + i % nu) as u32;
+            faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    TriMesh::from_faces(positions, &faces).unwrap()
+}
+
+/// An upright cylinder of radius 0.25 and height 0.8, `nu` cells around, `nv` high.
+pub fn cylinder(nu: usize, nv: usize, jitter: f64) -> TriMesh {
+    grid(nu, nv, false, jitter, |u, v| DVec3::new(0.25 * (TAU * u).cos(), 0.25 * (TAU * u).sin(), 0.8 * v))
+}
+
+/// A torus of radii 0.3 and 0.12, `nu` cells the long way, `nv` the short way.
+pub fn torus(nu: usize, nv: usize, jitter: f64) -> TriMesh {
+    grid(nu, nv, true, jitter, |u, v| {
+        let r = 0.3 + 0.12 * (TAU * v).cos();
+        DVec3::new(r * (TAU * u).cos(), r * (TAU * u).sin(), 0.12 * (TAU * v).sin())
+    })
+}
+
+/// The curve along row `j` of a grid, its crossings shaken by `noise`.
+pub fn ring(mesh: &TriMesh, nu: usize, j: usize, noise: f64) -> SurfaceCurve {
+    let mut random = Random(11);
+    let mut crossings = Vec::new();
+    for i in 0..nu {
+        let a = 2 * (j * nu + i);
+        for h in [3 * (a + 1), 3 * a + 1] {
+            let t = 0.5 + noise * 2.0 * (random.unit() - 0.5);
+            crossings.push(Crossing { halfedge: HalfedgeId::new(h), t });
+        }
+    }
+    let curve = SurfaceCurve { crossings, closed: true };
+    curve.check(mesh).unwrap();
+    curve
+}
+
+/// The curve up column `i` of a cylinder of `nv` rows, with fixed noise.
+pub fn upright(mesh: &TriMesh, nu: usize, nv: usize, i: usize) -> SurfaceCurve {
+    let mut random = Random(5);
+    let mut halfedges = vec![3 * 2 * i];
+    for j in 0..nv {
+        let a = 2 * (j * nu + i);
+        halfedges.extend([3 * a + 2, 3 * (a + 1) + 1]);
+    }
+    let crossing = |h| Crossing { halfedge: HalfedgeId::new(h), t: 0.15 + 0.7 * random.unit() };
+    let curve = SurfaceCurve { crossings: halfedges.into_iter().map(crossing).collect(), closed: false };
+    curve.check(mesh).unwrap();
+    curve
+}
+
+/// A closed curve through triangles: a cycle of the dual graph, closed by a random edge over a breadth-first
+/// tree from a random triangle. `None` where that cycle is too short.
+pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
+    let root = FaceId::new(random.below(mesh.n_faces()));
+    // The half-edge by which the tree enters a triangle's parent.
+    let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_faces()];
+    let mut queue = VecDeque::from([root]);
+    while let Some(f) = queue.pop_front() {
+        for h in mesh.face_halfedges(f) {
+            let Some(g) = mesh.twin(h) else { continue };
+            if mesh.face(g) != root && to_parent[mesh.face(g).index()].is_none() {
+                to_parent[mesh.face(g).index()] = Some(g);
+                queue.push_back(mesh.face(g));
+            }
+        }
+    }
+    let path = |mut f: FaceId| {
+        let mut up = Vec::new();
+        while let Some(h) = to_parent[f.index()] {
+            up.push(h);
+            f = mesh.face(mesh.twin(h).unwrap());
+        }
+        up
+    };
+    let h = HalfedgeId::new(random.below(mesh.n_halfedges()));
+    let g = mesh.twin(h)?;
+    let (mut from, mut to) = (path(mesh.face(h)), path(mesh.face(g)));
+    while from.last().is_some() && from.last() == to.last() {
+        from.pop();
+        to.pop();
+    }
+    // Down to h, across it, up again from the other side.
+    let mut halfedges: Vec<HalfedgeId> = from.iter().rev().map(|&h| mesh.twin(h).unwrap()).collect();
+    halfedges.push(h);
+    halfedges.extend(to);
+    let crossing = |halfedge| Crossing { halfedge, t: 0.1 + 0.8 * random.unit() };
+    let curve = SurfaceCurve { crossings: halfedges.into_iter().map(crossing).collect(), closed: true };
+    (curve.crossings.len() > 8 && curve.check(mesh).is_ok()).then_some(curve)
+}
+
+/// Algebraic numbers of crossings of a closed curve with `count` closed edge paths, one per random edge over a
+/// breadth-first tree of the vertices: they depend on the homology class alone.
+pub fn class_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<i64> {
+    let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_vertices()];
+    let mut queue = VecDeque::from([VertexId(0)]);
+    while let Some(v) = queue.pop_front() {
+        for h in mesh.outgoing(v).chain(mesh.outgoing(v).map(|h| mesh.prev(h))) {
+            let w = if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) };
+            if w != VertexId(0) && to_parent[w.index()].is_none() {
+                to_parent[w.index()] = Some(h);
+                queue.push_back(w);
+            }
+        }
+    }
+    let mut signed = vec![0i64; mesh.n_edges()];
+    for c in &curve.crossings {
+        let along = mesh.halfedge(mesh.edge(c.halfedge)) == c.halfedge;
+        signed[mesh.edge(c.halfedge).index()] += if along { 1 } else { -1 };
+    }
+    // What is crossed on the way up the tree from v, and where the way ends.
+    let up = |mut v: VertexId| {
+        let mut sum = 0;
+        while let Some(h) = to_parent[v.index()] {
+            let w = if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) };
+            let e = mesh.edge(h);
+            sum += signed[e.index()] * if mesh.edge_vertices(e)[0] == v { 1 } else { -1 };
+            v = w;
+        }
+        (sum, v)
+    };
+    let mut random = Random(3);
+    let mut number = || {
+        let e = mesh.edges().nth(random.below(mesh.n_edges())).unwrap();
+        let [a, b] = mesh.edge_vertices(e);
+        let ((up_a, root_a), (up_b, root_b)) = (up(a), up(b));
+        if root_a == root_b { up_b - up_a + signed[e.index()] } else { 0 }
+    };
+    (0..count).map(|_| number()).collect()
+}
+
+/// The closed curve of geodesics from each waypoint to the next, around each waypoint counter-clockwise at a
+/// thousandth of an edge: what a search on a graph of geodesics gives.
+pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve {
+    let next = |k: usize| waypoints[(k + 1) % waypoints.len()];
+    let paths: Vec<VertexPath> =
+        waypoints.iter().enumerate().map(|(k, &v)| geodesic_in(mesh, v, next(k), |_| true).unwrap()).collect();
+    let mut crossings = Vec::new();
+    for (k, path) in paths.iter().enumerate() {
+        crossings.extend(path.crossings.iter().copied());
+        let goal = mesh.face(paths[(k + 1) % paths.len()].crossings[0].halfedge);
+        // The outgoing half-edge at the waypoint, of the triangle the curve is in.
+        let mut out = mesh.prev(mesh.twin(path.crossings.last().unwrap().halfedge).unwrap());
+        while mesh.face(out) != goal {
+            crossings.push(Crossing { halfedge: mesh.prev(out), t: 1.0 - 1e-3 });
+            out = mesh.twin(mesh.prev(out)).unwrap();
+        }
+    }
+    let curve = SurfaceCurve { crossings, closed: true };
+    curve.check(mesh).unwrap();
+    curve
+}
+
+/// A mesh of the folder of real meshes, of bounding-box diagonal 1; `None` where there is none.
+pub fn real_mesh(file: &str) -> Option<TriMesh> {
+    let folder = std::env::var_os("PLAIT_MESHES")
+        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/meshes")), PathBuf::from);
+    let text = std::fs::read_to_string(folder.join(file)).ok()?;
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    let point = |w: &[&str]| DVec3::from_array([0, 1, 2].map(|i| w[i].parse().unwrap()));
+    let lines = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>());
+    if file.ends_with(".off") {
+        let mut lines = lines.filter(|w| !w.is_empty() && !w[0].starts_with('#')).skip(1);
+        let counts = lines.next()?;
+        for w in lines.by_ref().take(counts[0].parse().ok()?) {
+            positions.push(point(&w));
+        }
+        faces.extend(lines.map(|w| [1, 2, 3].map(|i| w[i].parse().unwrap())));
+    } else {
+        for w in lines.filter(|w| !w.is_empty()) {
+            match w[0] {
+                "v" => positions.push(point(&w[1..])),
+                "f" => faces.push([1, 2, 3].map(|i| w[i].split('/').next().unwrap().parse::<u32>().unwrap() - 1)),
+                _ => {}
+            }
+        }
+    }
+    let low = positions.iter().copied().reduce(DVec3::min)?;
+    let high = positions.iter().copied().reduce(DVec3::max)?;
+    positions.iter_mut().for_each(|p| *p = (*p - low) / (high - low).length());
+    TriMesh::from_faces(positions, &faces).ok()
+}

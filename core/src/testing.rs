@@ -1,0 +1,71 @@
+//! Small meshes and curves that many tests need.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use crate::mesh::{HalfedgeId, TriMesh};
+use crate::surface::{Crossing, SurfaceCurve};
+
+/// A grid of `n` × `m` cells, each of two triangles, closed or open in each direction, mapped by `map` from
+/// fractions of both directions. Cell `(i, j)` holds faces `2 (j n + i)` and the one after.
+pub(crate) fn grid(n: u32, m: u32, closed: [bool; 2], map: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let (columns, rows) = (n + u32::from(!closed[0]), m + u32::from(!closed[1]));
+    let mut positions = Vec::new();
+    for j in 0..rows {
+        for i in 0..columns {
+            positions.push(map(f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)));
+        }
+    }
+    let at = |i: u32, j: u32| (j % rows) * columns + i % columns;
+    let mut faces = Vec::new();
+    for j in 0..m {
+        for i in 0..n {
+            faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    TriMesh::from_faces(positions, &faces).expect("a grid is a manifold")
+}
+
+/// A torus of radii 0.3 and 0.1 as a closed grid.
+pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
+    grid(n, m, [true, true], |u, v| {
+        let (a, b) = (TAU * u, TAU * v);
+        let r = 0.3 + 0.1 * b.cos();
+        DVec3::new(r * a.cos(), r * a.sin(), 0.1 * b.sin())
+    })
+}
+
+/// A flat unit square as an open grid.
+pub(crate) fn square(n: u32) -> TriMesh {
+    grid(n, n, [false, false], |u, v| DVec3::new(u, v, 0.0))
+}
+
+/// The curve along row `j` of a [`grid`], crossing each edge at fraction `t` of its height.
+pub(crate) fn row(n: u32, j: u32, closed: bool, t: f64) -> SurfaceCurve {
+    let mut crossings = Vec::new();
+    if !closed {
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * (2 * j * n + 1) + 2), t: 1.0 - t });
+    }
+    for i in 0..n {
+        let cell = 2 * (j * n + i);
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * (cell + 1)), t });
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * cell + 1), t });
+    }
+    SurfaceCurve { crossings, closed }
+}
+
+/// The curve along column `i` of a [`grid`] of `n` × `m` cells, at fraction `t` of each edge's width.
+pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCurve {
+    let mut crossings = Vec::new();
+    if !closed {
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * (2 * i)), t });
+    }
+    for j in 0..m {
+        let cell = 2 * (j * n + i);
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * cell + 2), t: 1.0 - t });
+        crossings.push(Crossing { halfedge: HalfedgeId(3 * (cell + 1) + 1), t: 1.0 - t });
+    }
+    SurfaceCurve { crossings, closed }
+}

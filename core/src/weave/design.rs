@@ -1,0 +1,186 @@
+//! The document: which mesh, which options, which strips in which order.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::model::Options;
+use crate::mesh::{LoadError, LoadedMesh, TriMesh, builtin, load};
+use crate::surface::SurfaceCurve;
+
+/// Number of a strip, never used again within one design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct StripId(pub u32);
+
+/// A placed strip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Strip {
+    /// Its number.
+    pub id: StripId,
+    /// Its spine, on the mesh of the design.
+    pub curve: SurfaceCurve,
+    /// Cost of the loop when it was found.
+    pub cost: f64,
+    /// Whether it is drawn.
+    pub visible: bool,
+}
+
+/// Where the mesh of a design comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshSource {
+    /// A model that comes with the program.
+    Builtin(String),
+    /// A file.
+    File(PathBuf),
+}
+
+impl MeshSource {
+    /// The built-in model of this name, or else the file at this path.
+    pub fn from_name(name: &str) -> Self {
+        if builtin(name).is_some() { Self::Builtin(name.to_owned()) } else { Self::File(PathBuf::from(name)) }
+    }
+
+    /// Reads the mesh; a relative path is relative to `folder`.
+    ///
+    /// # Errors
+    ///
+    /// What reading says.
+    pub fn load(&self, folder: &Path) -> Result<LoadedMesh, DesignError> {
+        match self {
+            Self::Builtin(name) => builtin(name).ok_or_else(|| DesignError::UnknownModel(name.clone())),
+            Self::File(path) => Ok(load(&folder.join(path))?),
+        }
+    }
+}
+
+impl fmt::Display for MeshSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Builtin(name) => f.write_str(name),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// Why a design could not be read or written.
+#[derive(Debug, Error)]
+pub enum DesignError {
+    /// No built-in model of this name.
+    #[error("there is no built-in model named “{0}”")]
+    UnknownModel(String),
+    /// The mesh could not be read.
+    #[error(transparent)]
+    Mesh(#[from] LoadError),
+    /// The file could not be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is not a design.
+    #[error("{path} is not a Plait design: {source}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: serde_json::Error,
+    },
+    /// Written by a newer program.
+    #[error("the design has format version {0}; this program reads up to {VERSION}")]
+    Version(u32),
+    /// The mesh is not the one that the design was made on.
+    #[error("the mesh {mesh} is not the one this design was made on (it has changed since)")]
+    OtherMesh {
+        /// Where it was read.
+        mesh: String,
+    },
+}
+
+/// Version of the file format.
+const VERSION: u32 = 1;
+
+/// A design: a value that commands transform.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Design {
+    /// Version of the format.
+    pub version: u32,
+    /// Where the mesh comes from.
+    pub mesh: MeshSource,
+    /// Fingerprint of the mesh, to notice when it has changed.
+    pub fingerprint: String,
+    /// The options.
+    pub options: Options,
+    /// The strips in the order placed.
+    pub strips: Vec<Strip>,
+}
+
+impl Design {
+    /// A design without strips.
+    pub fn new(source: MeshSource, mesh: &TriMesh, options: Options) -> Self {
+        Self { version: VERSION, mesh: source, fingerprint: fingerprint(mesh), options, strips: Vec::new() }
+    }
+
+    /// Reads a design.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, or it is no design, or a newer one.
+    pub fn read(path: &Path) -> Result<Self, DesignError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| DesignError::File { path: path.to_owned(), source })?;
+        let design: Self =
+            serde_json::from_str(&text).map_err(|source| DesignError::Format { path: path.to_owned(), source })?;
+        if design.version > VERSION {
+            return Err(DesignError::Version(design.version));
+        }
+        Ok(design)
+    }
+
+    /// Writes the design.
+    ///
+    /// # Errors
+    ///
+    /// What the system says.
+    pub fn write(&self, path: &Path) -> Result<(), DesignError> {
+        let file = |source| DesignError::File { path: path.to_owned(), source };
+        let text =
+            serde_json::to_string(self).map_err(|source| DesignError::Format { path: path.to_owned(), source })?;
+        std::fs::write(path, text + "\n").map_err(file)
+    }
+
+    /// Checks that `mesh` is the one the design was made on and that all strips lie on it.
+    ///
+    /// # Errors
+    ///
+    /// [`DesignError::OtherMesh`].
+    pub fn check_mesh(&self, mesh: &TriMesh) -> Result<(), DesignError> {
+        let fits = fingerprint(mesh) == self.fingerprint && self.strips.iter().all(|s| s.curve.check(mesh).is_ok());
+        if fits { Ok(()) } else { Err(DesignError::OtherMesh { mesh: self.mesh.to_string() }) }
+    }
+}
+
+/// A short text that changes with the connectivity or the shape of the mesh (FNV-1a over all of it).
+fn fingerprint(mesh: &TriMesh) -> String {
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let mut eat = |bytes: &[u8]| {
+        for &b in bytes {
+            hash = (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    for h in mesh.halfedges() {
+        eat(&mesh.origin(h).0.to_le_bytes());
+    }
+    for p in mesh.positions() {
+        // Rounded, so that a file read back with fewer digits is still the same mesh.
+        for x in p.to_array() {
+            eat(&((x * 1e6).round() as i64).to_le_bytes());
+        }
+    }
+    format!("{}-{}-{hash:016x}", mesh.n_vertices(), mesh.n_faces())
+}

@@ -1,0 +1,20 @@
+//! Interactive and unattended weaving: the document, proposals, suggestions, scripts and export.
+//!
+//! Everything above the geometry and below the window. A [`Model`] is a mesh made ready once; a [`Design`] is
+//! the document, a plain value; a [`Session`] holds both together with what is derived from them.
+
+mod design;
+mod export;
+mod model;
+mod script;
+mod session;
+mod suggest;
+mod woven;
+
+pub use design::{Design, DesignError, MeshSource, Strip, StripId};
+pub use export::{Export, ExportOptions, QuadSize, export, write_all};
+pub use model::{Model, Options};
+pub use script::{Script, ScriptError, Step, replay};
+pub use session::{Proposal, Session, WeaveError};
+pub use suggest::{Goal, Stuck};
+pub use woven::Woven;

@@ -1,0 +1,192 @@
+//! Weave scripts: a designer's steps in a file, replayed without a window.
+//!
+//! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`.
+//! Points are in the file's coordinates and snap to the nearest point of the surface.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::design::{DesignError, MeshSource};
+use super::model::Options;
+use super::session::{Proposal, Session, WeaveError};
+use super::suggest::Goal;
+use crate::progress::Progress;
+
+/// One step of a designer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Step {
+    /// Point at the surface: the proposals through the nearest point of the surface, the best first.
+    Hover([f64; 3]),
+    /// Turn the wheel: so many proposals onward, or back if negative.
+    Browse(i64),
+    /// Click: place the current proposal. `false` does nothing.
+    Place(bool),
+    /// Press "Suggest" and place what is suggested. `false` does nothing.
+    Suggest(bool),
+    /// Remove the strip placed as the `n`-th of those present, from 0.
+    Delete(usize),
+    /// Take the last change back. `false` does nothing.
+    Undo(bool),
+    /// Make it again. `false` does nothing.
+    Redo(bool),
+}
+
+/// A weave script.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Script {
+    /// Name of a built-in model, or path of a mesh relative to the script.
+    pub mesh: String,
+    /// The options; the usual ones if left out.
+    #[serde(default)]
+    pub options: Options,
+    /// The steps in order.
+    pub steps: Vec<Step>,
+}
+
+/// Why a script could not be replayed.
+#[derive(Debug, Error)]
+pub enum ScriptError {
+    /// The file could not be read.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is no script.
+    #[error("{path} is not a weave script: {source}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: serde_json::Error,
+    },
+    /// The mesh could not be read.
+    #[error(transparent)]
+    Mesh(#[from] DesignError),
+    /// A step failed.
+    #[error("step {step}: {source}")]
+    Step {
+        /// Number of the step, from 1.
+        step: usize,
+        /// Why.
+        source: WeaveError,
+    },
+    /// A step that makes no sense where it stands.
+    #[error("step {step}: {reason}")]
+    Senseless {
+        /// Number of the step, from 1.
+        step: usize,
+        /// Why.
+        reason: &'static str,
+    },
+}
+
+impl Script {
+    /// Reads a script.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file or it is no script.
+    pub fn read(path: &Path) -> Result<Self, ScriptError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| ScriptError::File { path: path.to_owned(), source })?;
+        serde_json::from_str(&text).map_err(|source| ScriptError::Format { path: path.to_owned(), source })
+    }
+}
+
+/// Replays `script`; its mesh is looked for relative to `folder`.
+///
+/// # Errors
+///
+/// The first step that fails or makes no sense.
+pub fn replay(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, ScriptError> {
+    let source = MeshSource::from_name(&script.mesh);
+    let loaded = source.load(folder)?;
+    let source = match source {
+        MeshSource::File(path) => {
+            let path = folder.join(path);
+            MeshSource::File(path.canonicalize().unwrap_or(path))
+        }
+        builtin @ MeshSource::Builtin(_) => builtin,
+    };
+    let mut session = Session::open(loaded, source, script.options, progress)
+        .map_err(|source| ScriptError::Step { step: 0, source })?;
+    let mut shown = Shown::default();
+    for (i, step) in script.steps.iter().enumerate() {
+        shown.take(step, &mut session, progress).map_err(|e| match e {
+            StepError::Weave(source) => ScriptError::Step { step: i + 1, source },
+            StepError::Senseless(reason) => ScriptError::Senseless { step: i + 1, reason },
+        })?;
+    }
+    Ok(session)
+}
+
+/// The proposals on show and the one picked.
+#[derive(Default)]
+struct Shown {
+    proposals: Vec<Proposal>,
+    current: usize,
+}
+
+enum StepError {
+    Weave(WeaveError),
+    Senseless(&'static str),
+}
+
+impl From<WeaveError> for StepError {
+    fn from(error: WeaveError) -> Self {
+        Self::Weave(error)
+    }
+}
+
+impl Shown {
+    fn take(&mut self, step: &Step, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
+        match *step {
+            Step::Hover(at) => {
+                let at = session.model().loaded.units.from_file(DVec3::from(at));
+                if !at.is_finite() {
+                    return Err(StepError::Senseless("the point is not finite"));
+                }
+                let at = session.model().index.nearest(at);
+                self.proposals = session.proposals(at, progress)?;
+                self.current = 0;
+                if self.proposals.is_empty() {
+                    return Err(StepError::Senseless("no strip passes this point"));
+                }
+            }
+            Step::Browse(by) => {
+                let n = self.proposals.len() as i64;
+                if n == 0 {
+                    return Err(StepError::Senseless("nothing to browse: hover first"));
+                }
+                self.current = (self.current as i64 + by).rem_euclid(n) as usize;
+            }
+            Step::Place(true) => {
+                let proposal = self.proposals.get(self.current).cloned();
+                let proposal = proposal.ok_or(StepError::Senseless("nothing to place: hover first"))?;
+                session.place(proposal, progress)?;
+                *self = Self::default();
+            }
+            Step::Suggest(true) => {
+                let proposal = session.suggest(Goal::Separated, progress)?;
+                session.place(proposal, progress)?;
+                *self = Self::default();
+            }
+            Step::Delete(n) => {
+                let id = session.design().strips.get(n).map(|s| s.id);
+                session.remove(id.ok_or(StepError::Senseless("there is no such strip"))?, progress)?;
+            }
+            Step::Undo(true) => session.undo(progress)?,
+            Step::Redo(true) => session.redo(progress)?,
+            Step::Place(false) | Step::Suggest(false) | Step::Undo(false) | Step::Redo(false) => {}
+        }
+        Ok(())
+    }
+}

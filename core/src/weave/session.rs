@@ -1,0 +1,276 @@
+//! A session: a model, the design woven on it, and its history.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::design::{Design, DesignError, MeshSource, Strip, StripId};
+use super::model::{Model, Options};
+use super::suggest::Stuck;
+use super::woven::Woven;
+use crate::dual::{Arrangement, ArrangementError};
+use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
+use crate::field::FieldError;
+use crate::layout::{EmbedError, LayoutError, PatchError};
+use crate::mesh::{LoadedMesh, TriMesh};
+use crate::progress::{Cancelled, Progress};
+use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
+
+/// Whatever can go wrong while weaving.
+#[derive(Debug, Error)]
+pub enum WeaveError {
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The search graph could not be built.
+    #[error(transparent)]
+    Elastica(#[from] ElasticaError),
+    /// A field could not be computed.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// Strips could not be arranged.
+    #[error(transparent)]
+    Arrangement(#[from] ArrangementError),
+    /// The design could not be read, written or replayed.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// There is no valid layout yet.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The layout could not be embedded.
+    #[error(transparent)]
+    Embed(#[from] EmbedError),
+    /// The patches could not be mapped.
+    #[error(transparent)]
+    Patch(#[from] PatchError),
+    /// No strip can be suggested.
+    #[error(transparent)]
+    Stuck(#[from] Stuck),
+    /// There is no such strip.
+    #[error("there is no strip {}", .0.0)]
+    NoStrip(StripId),
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// A strip that could be placed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// Its spine.
+    pub curve: SurfaceCurve,
+    /// Cost of the loop that was found.
+    pub cost: f64,
+}
+
+impl Proposal {
+    /// The spine as points in space.
+    pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
+        self.curve.points(mesh)
+    }
+}
+
+/// A model, the design woven on it, and its history.
+#[derive(Debug)]
+pub struct Session {
+    model: Arc<Model>,
+    design: Design,
+    woven: Arc<Woven>,
+    /// Earlier and later lists of strips.
+    undo: Vec<Vec<Strip>>,
+    redo: Vec<Vec<Strip>>,
+    next_id: u32,
+    workspace: SearchWorkspace,
+}
+
+impl Session {
+    /// Makes `loaded` ready and starts an empty design on it.
+    ///
+    /// # Errors
+    ///
+    /// See [`Model::prepare`].
+    pub fn open(
+        loaded: LoadedMesh,
+        source: MeshSource,
+        options: Options,
+        progress: &Progress,
+    ) -> Result<Self, WeaveError> {
+        let design = Design::new(source, &loaded.mesh, options);
+        Self::resume(loaded, design, progress)
+    }
+
+    /// Makes `loaded` ready and continues `design` on it.
+    ///
+    /// # Errors
+    ///
+    /// See [`Model::prepare`]; [`DesignError::OtherMesh`] when the design was made on another mesh.
+    pub fn resume(loaded: LoadedMesh, design: Design, progress: &Progress) -> Result<Self, WeaveError> {
+        design.check_mesh(&loaded.mesh)?;
+        let model = Arc::new(Model::prepare(loaded, design.options, progress)?);
+        let woven = Arc::new(Woven::new(&model, &design.strips, progress)?);
+        let next_id = design.strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
+        let (undo, redo, workspace) = (Vec::new(), Vec::new(), SearchWorkspace::new());
+        Ok(Self { model, design, woven, undo, redo, next_id, workspace })
+    }
+
+    /// The mesh made ready.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The document.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// Says where the mesh of the design is to be found from now on.
+    pub fn set_source(&mut self, source: MeshSource) {
+        self.design.mesh = source;
+    }
+
+    /// What the strips make of the surface.
+    pub fn woven(&self) -> &Arc<Woven> {
+        &self.woven
+    }
+
+    /// The strips that could be placed through a point, the best first.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn proposals(&mut self, at: SurfacePoint, progress: &Progress) -> Result<Vec<Proposal>, WeaveError> {
+        self.proposals_with(at, progress, |_| {})
+    }
+
+    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn proposals_with(
+        &mut self,
+        at: SurfacePoint,
+        progress: &Progress,
+        mut first: impl FnMut(Proposal),
+    ) -> Result<Vec<Proposal>, WeaveError> {
+        let graph = &self.model.graph;
+        let vertex = at.nearest_vertex(&self.model.mesh);
+        let query = ProposalQuery::alternatives(vertex, &self.woven.mask);
+        let found = graph.proposals_with(&query, &mut self.workspace, progress, |l| {
+            first(Proposal { curve: l.curve.clone(), cost: l.cost });
+        })?;
+        found.loops.into_iter().map(|l| polished(graph, &l, Some(at), progress)).collect()
+    }
+
+    /// Places a strip.
+    ///
+    /// # Errors
+    ///
+    /// When its curve does not lie on the mesh, or cancelled; the design is then as before.
+    pub fn place(&mut self, proposal: Proposal, progress: &Progress) -> Result<StripId, WeaveError> {
+        let id = StripId(self.next_id);
+        let mut strips = self.design.strips.clone();
+        strips.push(Strip { id, curve: proposal.curve, cost: proposal.cost, visible: true });
+        self.change(strips, progress)?;
+        self.next_id += 1;
+        Ok(id)
+    }
+
+    /// Removes a strip.
+    ///
+    /// # Errors
+    ///
+    /// [`WeaveError::NoStrip`], or cancelled; the design is then as before.
+    pub fn remove(&mut self, id: StripId, progress: &Progress) -> Result<(), WeaveError> {
+        let strips: Vec<Strip> = self.design.strips.iter().filter(|s| s.id != id).cloned().collect();
+        if strips.len() == self.design.strips.len() {
+            return Err(WeaveError::NoStrip(id));
+        }
+        self.change(strips, progress)
+    }
+
+    /// Shows or hides a strip; not a step of the history.
+    ///
+    /// # Errors
+    ///
+    /// [`WeaveError::NoStrip`].
+    pub fn set_visible(&mut self, id: StripId, visible: bool) -> Result<(), WeaveError> {
+        let strip = self.design.strips.iter_mut().find(|s| s.id == id).ok_or(WeaveError::NoStrip(id))?;
+        strip.visible = visible;
+        Ok(())
+    }
+
+    /// Whether there is a step to take back.
+    pub fn can_undo(&self) -> bool {
+        !self.undo.is_empty()
+    }
+
+    /// Whether there is a step to take again.
+    pub fn can_redo(&self) -> bool {
+        !self.redo.is_empty()
+    }
+
+    /// Takes the last step back; does nothing when there is none.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn undo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
+        let Some(strips) = self.undo.last().cloned() else { return Ok(()) };
+        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
+        self.undo.pop();
+        self.redo.push(std::mem::replace(&mut self.design.strips, strips));
+        Ok(())
+    }
+
+    /// Takes a step again; does nothing when there is none.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn redo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
+        let Some(strips) = self.redo.last().cloned() else { return Ok(()) };
+        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
+        self.redo.pop();
+        self.undo.push(std::mem::replace(&mut self.design.strips, strips));
+        Ok(())
+    }
+
+    fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
+        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
+        self.undo.push(std::mem::replace(&mut self.design.strips, strips));
+        self.redo.clear();
+        Ok(())
+    }
+
+    /// What the surface would look like with `proposal` added; for suggestions.
+    pub(super) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
+        let placed = self.design.strips.iter().map(|s| &s.curve);
+        Arrangement::new(&self.model.mesh, placed.chain([curve]))
+    }
+}
+
+/// A found loop, relaxed to a smooth curve that still passes `at`.
+pub(super) fn polished(
+    graph: &ElasticaGraph,
+    found: &FoundLoop,
+    at: Option<SurfacePoint>,
+    progress: &Progress,
+) -> Result<Proposal, WeaveError> {
+    let options = RelaxOptions { anchors: at.into_iter().map(Anchor::Point).collect(), ..Default::default() };
+    let curve = match relax(graph.mesh(), &found.curve, &options, progress) {
+        Ok(relaxed) => relaxed.curve,
+        Err(error) => {
+            progress.check()?;
+            tracing::debug!(%error, "a loop is shown as found");
+            found.curve.clone()
+        }
+    };
+    Ok(Proposal { curve, cost: found.cost })
+}

@@ -1,0 +1,185 @@
+//! Suggesting the strip that helps most now.
+//!
+//! In the most urgent region some well-spread points are taken, the loops through them are found, and each is
+//! tried in the arrangement. Taken is the one of least cost per step of progress. Progress is measured by the
+//! *deficit* of an arrangement, a weighted count of what keeps regions from being good nodes; it is zero
+//! exactly when nothing is left to do.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::session::{Proposal, Session, WeaveError, polished};
+use crate::dual::{Colour, Finding, RegionReport, assess};
+use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
+use crate::mesh::VertexId;
+use crate::progress::{Cancelled, Progress};
+
+/// How far a layout is to be woven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Goal {
+    /// Until no region is red.
+    Valid,
+    /// Until no region is orange either.
+    Separated,
+}
+
+/// No strip can be suggested.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Stuck {
+    /// Nothing is left to do.
+    #[error("nothing is left to do")]
+    Done,
+    /// No loop through any of the points tried helps.
+    #[error("no strip was found that helps with region {region} ({reason})")]
+    NoHelp {
+        /// The region.
+        region: u32,
+        /// Its most urgent finding.
+        reason: String,
+    },
+}
+
+/// Points tried in the most urgent region: enough to meet each of its limbs.
+const POINTS: usize = 12;
+/// Candidates tried in the arrangement, the cheapest first.
+const TRIED: usize = 24;
+/// Search states settled per point, at most: bounds the time on large meshes.
+const BUDGET: u64 = 400_000;
+
+impl Session {
+    /// The strip that helps most now towards `goal`.
+    ///
+    /// # Errors
+    ///
+    /// [`Stuck`], or cancelled.
+    pub fn suggest(&self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
+        let woven = self.woven();
+        let before = deficit(&woven.reports, goal);
+        let urgent = urgent_regions(&woven.reports, goal);
+        let Some(&first) = urgent.first() else { return Err(Stuck::Done.into()) };
+        let open = DirectionMask::none();
+        // First where and how strips should go; then anywhere in the urgent regions; then in any direction.
+        for (mask, regions) in [(&woven.mask, 1), (&woven.mask, 4), (&open, 4)] {
+            for &region in urgent.iter().take(regions) {
+                let candidates = self.candidates(region, mask, progress)?;
+                if let Some(best) = self.best_of(candidates, before, goal, progress)? {
+                    return Ok(best);
+                }
+            }
+        }
+        let reason = woven.reports[first as usize].findings.first().map(ToString::to_string).unwrap_or_default();
+        Err(Stuck::NoHelp { region: first, reason }.into())
+    }
+
+    /// Loops through well-spread points of a region, the cheapest first.
+    fn candidates(&self, region: u32, mask: &DirectionMask, progress: &Progress) -> Result<Vec<Proposal>, WeaveError> {
+        let graph = &self.model().graph;
+        let points = spread_points(self, region);
+        let found: Vec<Vec<Proposal>> = points
+            .par_iter()
+            .map_init(SearchWorkspace::new, |work, &vertex| {
+                let query = ProposalQuery { budget: BUDGET, ..ProposalQuery::alternatives(vertex, mask) };
+                let found = graph.proposals(&query, work, progress)?;
+                found.loops.iter().map(|l| polished(graph, l, None, progress)).collect()
+            })
+            .collect::<Result<_, WeaveError>>()?;
+        let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.truncate(4 * TRIED);
+        Ok(all)
+    }
+
+    /// The candidate of least cost per step of progress, if any makes progress.
+    fn best_of(
+        &self,
+        candidates: Vec<Proposal>,
+        before: f64,
+        goal: Goal,
+        progress: &Progress,
+    ) -> Result<Option<Proposal>, Cancelled> {
+        let model = self.model();
+        let prices: Vec<Option<f64>> = candidates
+            .par_iter()
+            .map(|c| {
+                progress.check()?;
+                let Ok(arrangement) = self.arranged_with(&c.curve) else { return Ok(None) };
+                let reports = assess(&arrangement, &model.mesh, &model.corners);
+                let gain = before - deficit(&reports, goal);
+                Ok((gain > 1e-9).then(|| c.cost / gain))
+            })
+            .collect::<Result<_, Cancelled>>()?;
+        let best = prices
+            .iter()
+            .enumerate()
+            .filter_map(|(i, p)| p.map(|p| (i, p)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| candidates[i].clone());
+        Ok(best)
+    }
+}
+
+/// How much keeps the regions from being good nodes.
+fn deficit(reports: &[RegionReport], goal: Goal) -> f64 {
+    let one = |finding: &Finding| match *finding {
+        Finding::Untouched => 4.0,
+        Finding::Handles { handles } => 2.0 * handles as f64,
+        Finding::Borders { borders } => borders as f64 - 1.0,
+        Finding::Boundary { whole, stretches } => 2.0 * whole as f64 + stretches.saturating_sub(1 + whole) as f64,
+        Finding::NoCorner | Finding::Monogon => 1.0,
+        Finding::Digon => 0.5,
+        Finding::SeveralCorners { corners } => {
+            (if goal == Goal::Separated { 0.5 } else { 0.02 }) * (corners as f64 - 1.0)
+        }
+        Finding::Valence { .. } => 0.0,
+    };
+    reports.iter().flat_map(|r| &r.findings).map(one).sum()
+}
+
+/// Regions that keep the goal from being reached, the most urgent and then the largest first.
+fn urgent_regions(reports: &[RegionReport], goal: Goal) -> Vec<u32> {
+    let matters = |r: &RegionReport| {
+        r.colour == Colour::Red
+            || r.findings.contains(&Finding::Digon)
+            || (goal == Goal::Separated && r.colour == Colour::Orange)
+    };
+    let mut list: Vec<u32> = (0..reports.len() as u32).filter(|&i| matters(&reports[i as usize])).collect();
+    list.sort_by(|&a, &b| {
+        let (a, b) = (&reports[a as usize], &reports[b as usize]);
+        b.colour.cmp(&a.colour).then(b.area.total_cmp(&a.area))
+    });
+    list
+}
+
+/// Vertices of a region, each as far as possible from those before.
+fn spread_points(session: &Session, region: u32) -> Vec<VertexId> {
+    let (woven, mesh) = (session.woven(), &session.model().mesh);
+    let mut inside: Vec<u32> = woven.arrangement.regions[region as usize]
+        .faces
+        .iter()
+        .flat_map(|&f| woven.arrangement.refined.corners(f))
+        .filter(|&v| (v as usize) < mesh.n_vertices())
+        .collect();
+    inside.sort_unstable();
+    inside.dedup();
+    if inside.is_empty() {
+        return woven.arrangement.regions[region as usize]
+            .faces
+            .first()
+            .map(|&f| mesh.face_vertices(crate::mesh::FaceId(woven.arrangement.refined.base_face(f)))[0])
+            .into_iter()
+            .collect();
+    }
+    let mean = inside.iter().map(|&v| mesh.positions()[v as usize]).sum::<DVec3>() / inside.len() as f64;
+    let mut distance: Vec<f64> = inside.iter().map(|&v| mesh.positions()[v as usize].distance(mean)).collect();
+    let mut picked = Vec::new();
+    while picked.len() < POINTS.min(inside.len()) {
+        let far = (0..inside.len()).max_by(|&i, &j| distance[i].total_cmp(&distance[j])).unwrap_or(0);
+        let at = mesh.positions()[inside[far] as usize];
+        picked.push(VertexId(inside[far]));
+        for (d, &v) in distance.iter_mut().zip(&inside) {
+            *d = d.min(mesh.positions()[v as usize].distance(at));
+        }
+    }
+    picked
+}

@@ -175,3 +175,28 @@ fn a_zigzag_leans_away_from_its_edges() {
         assert!(tangent.dot(middle).abs() < 0.12, "{}", tangent.dot(middle));
     }
 }
+
+/// A real mesh, or a note that it is missing.
+fn real(name: &str) -> Option<TriMesh> {
+    let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
+        std::path::PathBuf::from,
+    );
+    let mesh = crate::mesh::load(&folder.join(name)).ok().map(|l| l.mesh);
+    if mesh.is_none() {
+        eprintln!("{name} not found, skipped");
+    }
+    mesh
+}
+
+#[test]
+fn real_shapes_have_tens_of_corners() {
+    for name in ["bunny_7k.off", "rockerarm_5k.obj"] {
+        let Some(mesh) = real(name) else { continue };
+        let field = shape(&mesh);
+        assert_eq!(sum(&field.singularities), 4 * mesh.euler_characteristic());
+        let kept = pronounced(&mesh, &field.singularities, 0.05);
+        assert_eq!(sum(&kept), 4 * mesh.euler_characteristic());
+        assert!((8..60).contains(&kept.len()), "{name}: {} of {}", kept.len(), field.singularities.len());
+    }
+}

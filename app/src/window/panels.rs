@@ -130,11 +130,15 @@ pub fn show(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 fn top_bar(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
-    ui.horizontal(|ui| {
+    egui::MenuBar::new().ui(ui, |ui| {
         ui.label(RichText::new("Plait").size(18.0).color(theme::ACCENT));
         ui.add_space(6.0);
-        egui::MenuBar::new().ui(ui, |ui| menus(app, ui, actions));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| quick_buttons(app, ui, actions));
+        menus(app, ui, actions);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            // Buttons, not menus: framed.
+            ui.set_style(ui.ctx().global_style());
+            quick_buttons(app, ui, actions);
+        });
     });
 }
 

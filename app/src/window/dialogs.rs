@@ -80,6 +80,11 @@ impl Dialogs {
         }
     }
 
+    /// Whether a dialog of our own holds the keyboard.
+    pub fn is_open(&self) -> bool {
+        self.plain.is_some()
+    }
+
     fn file_name(&self, asked: Asked) -> String {
         let stem = Path::new(&self.suggested_name).file_stem().map(|s| s.to_string_lossy().to_lowercase());
         let stem = stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "design".into());
@@ -141,7 +146,8 @@ struct Plain {
 impl Plain {
     fn new(asked: Asked, name: &str) -> Self {
         let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("/"));
-        let mut plain = Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None, focused: false };
+        let mut plain =
+            Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None, focused: false };
         plain.list();
         plain
     }

@@ -57,7 +57,10 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
 /// The actions of the keys pressed, unless text is being edited.
 pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
     let mut actions = Vec::new();
-    let typing = ctx.egui_wants_keyboard_input();
+    if app.dialogs.is_open() {
+        return actions;
+    }
+    let typing = ctx.text_edit_focused();
     ctx.input_mut(|i| {
         // The longer combination first, or the shorter one would take it.
         for (shortcut, action) in [
@@ -69,7 +72,9 @@ pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
             (EXPORT, Action::AskExport),
             (QUIT, Action::Quit),
         ] {
-            if i.consume_shortcut(&shortcut) {
+            // A text field has a history of its own.
+            let of_text = typing && matches!(action, Action::Undo | Action::Redo);
+            if !of_text && i.consume_shortcut(&shortcut) {
                 actions.push(action);
             }
         }

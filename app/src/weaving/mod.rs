@@ -12,7 +12,6 @@ use plait_core::dual::{Arrangement, Colour};
 use plait_core::layout::{LayoutError, QuadLayout, embed};
 use plait_core::mesh::builtin_names;
 use plait_core::progress::Progress;
-use plait_core::strip::StripMap;
 use plait_core::surface::SurfacePoint;
 use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
@@ -113,7 +112,6 @@ struct SessionEngine {
 #[derive(Default)]
 pub struct Later {
     woven: Option<Arc<Woven>>,
-    stripes: Option<Option<Arc<StripMap>>>,
     layout: Option<Option<Arc<LayoutPreview>>>,
 }
 
@@ -196,16 +194,11 @@ impl Engine for SessionEngine {
     }
 
     fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError> {
-        if self.later.stripes.is_none() {
-            let map = stripes::strip_map(&self.session, progress).map(|m| m.map(Arc::new));
-            let map = or_nothing(map, progress)?.flatten();
-            self.later.stripes = Some(map);
-        } else if self.later.layout.is_none() {
-            let layout = or_nothing(layout_preview(&self.session, progress), progress)?;
-            self.later.layout = Some(layout.map(Arc::new));
-        } else {
+        if self.later.layout.is_some() {
             return Ok(false);
         }
+        let layout = or_nothing(layout_preview(&self.session, progress), progress)?;
+        self.later.layout = Some(layout.map(Arc::new));
         self.refresh();
         Ok(true)
     }

@@ -41,7 +41,7 @@ impl ModelSnapshot {
             model: Arc::clone(&self.facts),
             design_mesh: Arc::clone(&model.mesh),
             index: Arc::clone(&model.index),
-            surface: Arc::new(self.surface(session, later)),
+            surface: Arc::new(self.surface(session)),
             strips: strips.collect(),
             remains: words::remains(session),
             summary,
@@ -52,7 +52,7 @@ impl ModelSnapshot {
         }
     }
 
-    fn surface(&self, session: &Session, later: &Later) -> DisplaySurface {
+    fn surface(&self, session: &Session) -> DisplaySurface {
         let (mesh, woven) = (&session.model().mesh, session.woven());
         let refined = &woven.arrangement.refined;
         let faces: Vec<[u32; 3]> = (0..refined.n_faces() as u32).map(|f| refined.corners(f)).collect();
@@ -65,8 +65,7 @@ impl ModelSnapshot {
             woven.arrangement.region_of_face.iter().map(color).collect()
         };
         let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
-        let map = later.stripes.as_ref().and_then(Option::as_deref);
-        let stripes = map.map(|m| stripes::pattern(m, visible)).unwrap_or_default();
+        let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
         DisplaySurface { positions: refined.positions.clone(), faces, normals, regions, stripes }
     }
 

@@ -1,34 +1,12 @@
 //! The stripe pattern of a session's strips.
 
-use plait_core::dual::Mark;
-use plait_core::progress::Progress;
-use plait_core::strip::{Strip, StripError, StripMap};
-use plait_core::weave::Session;
+use plait_core::strip::{Strip, StripMap};
 
 use crate::engine::Stripes;
 
 /// Distance of two lines of the pattern, as a fraction of the model's diagonal: close enough to read as a texture,
 /// far enough to follow a single line.
 const SPACING: f64 = 0.012;
-
-/// The strip map of the placed strips on the refined mesh of their arrangement; none without strips.
-///
-/// # Errors
-///
-/// See [`StripMap::new`].
-pub fn strip_map(session: &Session, progress: &Progress) -> Result<Option<StripMap>, StripError> {
-    if session.design().strips.is_empty() {
-        return Ok(None);
-    }
-    let refined = &session.woven().arrangement.refined;
-    let Ok(mesh) = refined.to_mesh() else { return Ok(None) };
-    let curve = |e| match refined.mark(mesh.halfedge(e).0) {
-        Mark::Curve(curve) => Some(curve),
-        _ => None,
-    };
-    let curve_of_edge: Vec<Option<u32>> = mesh.edges().map(curve).collect();
-    StripMap::new(&mesh, &curve_of_edge, progress).map(Some)
-}
 
 /// The pattern of each face; `visible` tells which curves show theirs.
 pub fn pattern(map: &StripMap, visible: impl Fn(u32) -> bool) -> Vec<[Option<Stripes>; 2]> {

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::session::WeaveError;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
 use crate::field::{Guides, Metric, pronounced, shape_field};
-use crate::mesh::{LoadedMesh, SHARP_DIHEDRAL, Topology, TriMesh, VertexId, sharp_edges};
+use crate::mesh::{
+    LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
+};
 use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
 
@@ -65,7 +67,8 @@ impl Model {
         let mesh = Arc::new(loaded.mesh.clone());
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&mesh);
-        let sharp = sharp_edges(&mesh, options.sharp_dihedral);
+        let mut sharp = sharp_edges(&mesh, options.sharp_dihedral);
+        drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
         let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);

@@ -1,0 +1,208 @@
+//! The camera: a turntable around a target, with pan, zoom toward a point, and framing.
+//!
+//! Right-handed; the turntable's axis is world y unless [`Camera::z_up`]. Angles in radians, lengths in world units
+//! (models are normalised to a bounding-box diagonal of 1), screen positions in points from the top left corner.
+
+use glam::{Mat4, Vec2, Vec3, Vec4Swizzles};
+
+use crate::render::ViewUniforms;
+
+/// Half the world diagonal seen around the target stays within these distances, so that one cannot get lost.
+const DISTANCES: std::ops::RangeInclusive<f32> = 0.005..=20.0;
+/// Just short of the poles, where "up" would have no meaning.
+const MAX_PITCH: f32 = 1.55;
+/// Radians of turn per point of drag: half a turn across about 450 points.
+const TURN: f32 = 0.007;
+
+/// A turntable camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// The point the camera turns about and looks at.
+    pub target: Vec3,
+    /// From the target to the eye.
+    pub distance: f32,
+    /// Turn about the up axis; 0 looks along −z.
+    pub yaw: f32,
+    /// Height of the eye over the target; positive looks down.
+    pub pitch: f32,
+    /// Whether the turntable's axis is world z instead of y.
+    pub z_up: bool,
+    /// Full vertical angle of view.
+    pub vertical_fov: f32,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self { target: Vec3::ZERO, distance: 1.9, yaw: 0.6, pitch: 0.35, z_up: false, vertical_fov: 0.60 }
+    }
+}
+
+/// A ray in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// The eye.
+    pub origin: Vec3,
+    /// Of unit length.
+    pub direction: Vec3,
+}
+
+impl Camera {
+    /// The rigid motion from view space (looking along −z, y up) to world space.
+    pub fn world_from_view(&self) -> Mat4 {
+        let turn = Mat4::from_rotation_y(self.yaw) * Mat4::from_rotation_x(-self.pitch);
+        let lift = if self.z_up { Mat4::from_rotation_x(std::f32::consts::FRAC_PI_2) } else { Mat4::IDENTITY };
+        Mat4::from_translation(self.target) * lift * turn * Mat4::from_translation(Vec3::Z * self.distance)
+    }
+
+    /// The inverse of [`Self::world_from_view`].
+    pub fn view_from_world(&self) -> Mat4 {
+        self.world_from_view().inverse()
+    }
+
+    /// Distances of the near and the far plane: around a model of diagonal 1 wherever the target was panned to.
+    pub fn planes(&self) -> (f32, f32) {
+        (self.distance * 0.02, self.distance + 8.0)
+    }
+
+    /// The projection for an image of this shape; depth from 0 (near) to 1 (far).
+    pub fn clip_from_view(&self, aspect_ratio: f32) -> Mat4 {
+        let (near, far) = self.planes();
+        glam::camera::rh::proj::directx::perspective(self.vertical_fov, aspect_ratio, near, far)
+    }
+
+    /// What the shaders need for an image of `size`.
+    pub fn uniforms(&self, size: Vec2) -> ViewUniforms {
+        let (near, far) = self.planes();
+        ViewUniforms::new(self.clip_from_view(aspect(size)), self.view_from_world(), near, far)
+    }
+
+    /// The ray through `at` in an image of `size`.
+    pub fn ray(&self, at: Vec2, size: Vec2) -> Ray {
+        let half = (self.vertical_fov * 0.5).tan();
+        let ndc = Vec2::new(at.x / size.x.max(1.0) * 2.0 - 1.0, 1.0 - at.y / size.y.max(1.0) * 2.0);
+        let in_view = Vec3::new(ndc.x * half * aspect(size), ndc.y * half, -1.0).normalize();
+        let world_from_view = self.world_from_view();
+        Ray {
+            origin: world_from_view.transform_point3(Vec3::ZERO),
+            direction: world_from_view.transform_vector3(in_view),
+        }
+    }
+
+    /// Where `point` appears in an image of `size`; `None` behind the eye.
+    pub fn project(&self, point: Vec3, size: Vec2) -> Option<Vec2> {
+        let clip = self.clip_from_view(aspect(size)) * self.view_from_world() * point.extend(1.0);
+        let ndc = clip.xy() / clip.w;
+        (clip.w > 0.0).then(|| (ndc * Vec2::new(0.5, -0.5) + 0.5) * size)
+    }
+
+    /// Turns by a drag of `delta` points.
+    pub fn orbit(&mut self, delta: Vec2) {
+        self.yaw = (self.yaw - delta.x * TURN).rem_euclid(std::f32::consts::TAU);
+        self.pitch = (self.pitch + delta.y * TURN).clamp(-MAX_PITCH, MAX_PITCH);
+    }
+
+    /// Moves sideways by a drag of `delta` points, so that the target follows the pointer.
+    pub fn pan(&mut self, delta: Vec2, size: Vec2) {
+        let per_point = 2.0 * self.distance * (self.vertical_fov * 0.5).tan() / size.y.max(1.0);
+        let world_from_view = self.world_from_view();
+        self.target += world_from_view.transform_vector3(Vec3::new(-delta.x, delta.y, 0.0)) * per_point;
+    }
+
+    /// Comes nearer by `factor` (below 1) or recedes (above 1); `toward` stays where it is on the screen.
+    pub fn zoom(&mut self, factor: f32, toward: Vec3) {
+        let distance = (self.distance * factor).clamp(*DISTANCES.start(), *DISTANCES.end());
+        let factor = distance / self.distance;
+        self.target = toward + (self.target - toward) * factor;
+        self.distance = distance;
+    }
+
+    /// The point under `at` at the target's depth: where to zoom to over the background.
+    pub fn point_at_target_depth(&self, at: Vec2, size: Vec2) -> Vec3 {
+        let ray = self.ray(at, size);
+        let forward = (self.target - ray.origin).normalize();
+        ray.origin + ray.direction * (self.distance / ray.direction.dot(forward).max(1e-3))
+    }
+
+    /// Looks at a sphere so that it fills the image, from the present direction.
+    pub fn frame(&mut self, centre: Vec3, radius: f32, size: Vec2) {
+        let half = (self.vertical_fov * 0.5).tan() * aspect(size).min(1.0);
+        let distance = radius * 1.02 / half.atan().sin();
+        self.target = centre;
+        self.distance = distance.clamp(*DISTANCES.start(), *DISTANCES.end());
+    }
+}
+
+fn aspect(size: Vec2) -> f32 {
+    (size.x.max(1.0) / size.y.max(1.0)).clamp(0.01, 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Vec2 = Vec2::new(800.0, 500.0);
+
+    #[test]
+    fn the_target_is_in_the_middle() {
+        for z_up in [false, true] {
+            let camera = Camera { target: Vec3::new(0.1, 0.2, -0.3), z_up, ..Camera::default() };
+            let middle = camera.project(camera.target, SIZE).unwrap();
+            assert!(middle.distance(SIZE * 0.5) < 1e-2, "{middle}");
+        }
+    }
+
+    #[test]
+    fn rays_and_projection_are_inverse() {
+        let camera = Camera { yaw: 2.0, pitch: -0.7, ..Camera::default() };
+        let at = Vec2::new(123.0, 321.0);
+        let ray = camera.ray(at, SIZE);
+        assert!(camera.project(ray.origin + ray.direction * 1.7, SIZE).unwrap().distance(at) < 1e-2);
+        assert_eq!(camera.project(ray.origin - ray.direction, SIZE), None);
+    }
+
+    #[test]
+    fn zooming_keeps_the_point_under_the_pointer() {
+        let mut camera = Camera::default();
+        let at = Vec2::new(600.0, 100.0);
+        let point = camera.point_at_target_depth(at, SIZE);
+        for factor in [0.5, 0.5, 1.7] {
+            camera.zoom(factor, point);
+            assert!(camera.project(point, SIZE).unwrap().distance(at) < 0.1);
+        }
+        camera.zoom(1e9, point);
+        assert_eq!(camera.distance, *DISTANCES.end());
+    }
+
+    #[test]
+    fn panning_moves_the_picture_with_the_pointer() {
+        let mut camera = Camera::default();
+        let marked = camera.target;
+        camera.pan(Vec2::new(40.0, -25.0), SIZE);
+        let seen = camera.project(marked, SIZE).unwrap();
+        assert!(seen.distance(SIZE * 0.5 + Vec2::new(40.0, -25.0)) < 0.5, "{seen}");
+    }
+
+    #[test]
+    fn dragging_right_shows_the_left_side() {
+        let mut camera = Camera { yaw: 0.0, pitch: 0.0, ..Camera::default() };
+        camera.orbit(Vec2::new(100.0, 0.0));
+        assert!(camera.ray(SIZE * 0.5, SIZE).origin.x < -0.1);
+        camera.orbit(Vec2::new(0.0, 1e6));
+        assert_eq!(camera.pitch, MAX_PITCH);
+    }
+
+    #[test]
+    fn a_framed_sphere_fits() {
+        for size in [SIZE, Vec2::new(300.0, 900.0)] {
+            let mut camera = Camera::default();
+            let centre = Vec3::new(0.3, 0.0, 0.1);
+            camera.frame(centre, 0.5, size);
+            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+                for p in [centre + axis * 0.5, centre - axis * 0.5] {
+                    let seen = camera.project(p, size).unwrap();
+                    assert!(seen.cmpge(Vec2::ZERO).all() && seen.cmple(size).all(), "{seen} in {size}");
+                }
+            }
+        }
+    }
+}

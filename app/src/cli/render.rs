@@ -1,0 +1,52 @@
+//! `plait render`: a picture of a design, drawn as the window draws it.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use glam::Vec2;
+use plait_core::progress::Progress;
+
+use super::RenderArguments;
+use crate::camera::Camera;
+use crate::engine::{Opener, Scene};
+use crate::render::{Frame, SceneInput, Toggles, render_to_png};
+use crate::shading;
+
+/// Opens the design and writes its picture.
+///
+/// # Errors
+///
+/// When the design cannot be opened, there is no graphics driver, or the file cannot be written.
+pub fn run(arguments: &RenderArguments, opener: &dyn Opener) -> anyhow::Result<()> {
+    let source = super::source(&arguments.design, opener);
+    let engine = opener.open(&source, &Progress::new()).with_context(|| format!("cannot open {}", source.name()))?;
+    let frame = frame(&engine.scene(), arguments);
+    render_to_png(&frame, &arguments.out).with_context(|| format!("cannot draw {}", arguments.out.display()))
+}
+
+/// The whole model, with all that the window shows of it.
+fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
+    let overlay = shading::Overlay { scene, proposal: None, selected: None, layout: true, strips: true, place: None };
+    let (lines, markers) = shading::overlay(&overlay);
+    let mut camera = Camera {
+        yaw: arguments.yaw.to_radians(),
+        pitch: arguments.pitch.clamp(-88.0, 88.0).to_radians(),
+        z_up: arguments.z_up,
+        ..Camera::default()
+    };
+    let size = Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32);
+    let (centre, radius) = shading::bounding_sphere(&scene.surface);
+    camera.frame(centre, radius, size);
+    Frame {
+        scene: SceneInput {
+            surface: Arc::new(shading::surface(&scene.surface)),
+            lines: Arc::new(lines),
+            markers: Arc::new(markers),
+        },
+        view: camera.uniforms(size),
+        toggles: Toggles { wireframe: arguments.wireframe, ..Toggles::default() },
+        size: arguments.size,
+        // Lines keep their weight relative to the picture, as on a screen 900 points high.
+        pixels_per_point: size.min_element() / 900.0,
+    }
+}

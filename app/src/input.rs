@@ -1,0 +1,272 @@
+//! From what the pointer does over the 3D view to what the user means by it.
+//!
+//! A small state machine without a window. Left click places; left or middle drag orbits; right drag or middle drag
+//! with Shift pans; the wheel browses over the surface and zooms over the background or with Ctrl. Positions in
+//! points from the view's top left corner.
+
+use glam::Vec2;
+
+/// A press that moves no farther than this, in points, is a click.
+const CLICK_SLOP: f32 = 4.0;
+/// How far a touchpad scrolls, in points, for what one notch of a wheel does.
+const POINTS_PER_NOTCH: f32 = 40.0;
+/// Zoom of one notch.
+const ZOOM_PER_NOTCH: f32 = 0.88;
+
+/// Which button.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Button {
+    /// Usually the left one.
+    Primary,
+    /// The wheel.
+    Middle,
+    /// Usually the right one.
+    Secondary,
+}
+
+/// Keys held while the pointer acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Held {
+    /// Shift.
+    pub shift: bool,
+    /// Ctrl, or Command on a Mac.
+    pub ctrl: bool,
+}
+
+/// What the pointer did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PointerEvent {
+    /// It is at a position now.
+    Moved(Vec2),
+    /// It left the view or the window.
+    Gone,
+    /// A button went down.
+    Pressed(Button, Vec2, Held),
+    /// A button went up.
+    Released(Button, Vec2),
+    /// The wheel turned: notches, positive away from the user.
+    Wheel(f32, Held),
+    /// A touchpad scrolled: points, positive away from the user.
+    Scroll(f32, Held),
+    /// Two fingers spread (above 1) or closed (below 1).
+    Pinch(f32),
+}
+
+/// What the user means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Intent {
+    /// Show what would be placed here.
+    Hover(Vec2),
+    /// Show nothing.
+    Leave,
+    /// Go on by so many alternatives.
+    Browse(i32),
+    /// Take what is shown here.
+    Place(Vec2),
+    /// Turn the view by a drag.
+    Orbit(Vec2),
+    /// Move the view by a drag.
+    Pan(Vec2),
+    /// Come nearer (below 1) or recede, toward a position.
+    Zoom(f32, Vec2),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Drag {
+    None,
+    /// Pressed, not yet moved beyond the slop.
+    Pending {
+        button: Button,
+        from: Vec2,
+        pan: bool,
+    },
+    Orbit(Button),
+    Pan(Button),
+}
+
+/// The state machine.
+#[derive(Debug)]
+pub struct Input {
+    position: Option<Vec2>,
+    drag: Drag,
+    /// Scrolling not yet worth a notch.
+    scrolled: f32,
+}
+
+impl Default for Input {
+    fn default() -> Self {
+        Self { position: None, drag: Drag::None, scrolled: 0.0 }
+    }
+}
+
+impl Input {
+    /// Whether a button is down: nothing is hovered then.
+    pub fn is_dragging(&self) -> bool {
+        self.drag != Drag::None
+    }
+
+    /// Where the pointer is, while it is over the view.
+    pub fn position(&self) -> Option<Vec2> {
+        self.position
+    }
+
+    /// Takes in one event; `over_surface` tells whether the pointer is over the surface now.
+    pub fn handle(&mut self, event: PointerEvent, over_surface: bool) -> Option<Intent> {
+        match event {
+            PointerEvent::Moved(to) => self.moved(to),
+            PointerEvent::Gone => {
+                self.scrolled = 0.0;
+                self.position.take().filter(|_| !self.is_dragging()).map(|_| Intent::Leave)
+            }
+            PointerEvent::Pressed(button, at, held) => {
+                self.position = Some(at);
+                if self.is_dragging() {
+                    return None;
+                }
+                let pan = button == Button::Secondary || (button == Button::Middle && held.shift);
+                self.drag = Drag::Pending { button, from: at, pan };
+                None
+            }
+            PointerEvent::Released(button, at) => self.released(button, at, over_surface),
+            PointerEvent::Wheel(notches, held) => self.turned(notches, held, over_surface),
+            PointerEvent::Scroll(points, held) => self.turned(points / POINTS_PER_NOTCH, held, over_surface),
+            PointerEvent::Pinch(factor) => Some(Intent::Zoom(1.0 / factor.clamp(0.1, 10.0), self.position?)),
+        }
+    }
+
+    fn moved(&mut self, to: Vec2) -> Option<Intent> {
+        let from = self.position.replace(to);
+        match self.drag {
+            Drag::None => Some(Intent::Hover(to)),
+            Drag::Pending { from, .. } if from.distance(to) <= CLICK_SLOP => None,
+            Drag::Pending { button, from, pan: true } => {
+                self.drag = Drag::Pan(button);
+                Some(Intent::Pan(to - from))
+            }
+            Drag::Pending { button, from, pan: false } => {
+                self.drag = Drag::Orbit(button);
+                Some(Intent::Orbit(to - from))
+            }
+            Drag::Orbit(_) => Some(Intent::Orbit(to - from.unwrap_or(to))),
+            Drag::Pan(_) => Some(Intent::Pan(to - from.unwrap_or(to))),
+        }
+    }
+
+    fn released(&mut self, button: Button, at: Vec2, over_surface: bool) -> Option<Intent> {
+        let held = match self.drag {
+            Drag::None => return None,
+            Drag::Pending { button, .. } | Drag::Orbit(button) | Drag::Pan(button) => button,
+        };
+        if held != button {
+            return None;
+        }
+        let click = matches!(self.drag, Drag::Pending { button: Button::Primary, .. });
+        self.drag = Drag::None;
+        if click && over_surface { Some(Intent::Place(at)) } else { Some(Intent::Hover(at)) }
+    }
+
+    fn turned(&mut self, notches: f32, held: Held, over_surface: bool) -> Option<Intent> {
+        let at = self.position?;
+        if held.ctrl || !over_surface || self.is_dragging() {
+            self.scrolled = 0.0;
+            return Some(Intent::Zoom(ZOOM_PER_NOTCH.powf(notches.clamp(-8.0, 8.0)), at));
+        }
+        // Toward the user goes on to the next, worse alternative, as a list would scroll down.
+        self.scrolled -= notches;
+        let whole = self.scrolled.trunc();
+        self.scrolled -= whole;
+        (whole != 0.0).then_some(Intent::Browse(whole as i32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: Vec2 = Vec2::new(100.0, 100.0);
+    const FREE: Held = Held { shift: false, ctrl: false };
+
+    fn at_rest() -> Input {
+        let mut input = Input::default();
+        assert_eq!(input.handle(PointerEvent::Moved(HERE), true), Some(Intent::Hover(HERE)));
+        input
+    }
+
+    fn drag(button: Button, held: Held) -> [Option<Intent>; 4] {
+        let mut input = at_rest();
+        let there = HERE + Vec2::new(10.0, 0.0);
+        [
+            input.handle(PointerEvent::Pressed(button, HERE, held), true),
+            input.handle(PointerEvent::Moved(there), true),
+            input.handle(PointerEvent::Moved(there + Vec2::Y), true),
+            input.handle(PointerEvent::Released(button, there + Vec2::Y), true),
+        ]
+    }
+
+    #[test]
+    fn a_steady_click_places_on_the_surface_only() {
+        for over in [true, false] {
+            let mut input = at_rest();
+            assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), over), None);
+            let near = HERE + Vec2::new(2.0, 1.0);
+            assert_eq!(input.handle(PointerEvent::Moved(near), over), None);
+            let expected = if over { Intent::Place(near) } else { Intent::Hover(near) };
+            assert_eq!(input.handle(PointerEvent::Released(Button::Primary, near), over), Some(expected));
+            assert!(!input.is_dragging());
+        }
+    }
+
+    #[test]
+    fn drags_orbit_or_pan_and_place_nothing() {
+        let delta = Vec2::new(10.0, 0.0);
+        let end = Some(Intent::Hover(HERE + delta + Vec2::Y));
+        let orbit = [None, Some(Intent::Orbit(delta)), Some(Intent::Orbit(Vec2::Y)), end];
+        let pan = [None, Some(Intent::Pan(delta)), Some(Intent::Pan(Vec2::Y)), end];
+        assert_eq!(drag(Button::Primary, FREE), orbit);
+        assert_eq!(drag(Button::Middle, FREE), orbit);
+        assert_eq!(drag(Button::Middle, Held { shift: true, ctrl: false }), pan);
+        assert_eq!(drag(Button::Secondary, FREE), pan);
+    }
+
+    #[test]
+    fn the_wheel_browses_over_the_surface_and_zooms_elsewhere() {
+        let mut input = at_rest();
+        assert_eq!(input.handle(PointerEvent::Wheel(-1.0, FREE), true), Some(Intent::Browse(1)));
+        assert_eq!(input.handle(PointerEvent::Wheel(2.0, FREE), true), Some(Intent::Browse(-2)));
+        let ctrl = Held { shift: false, ctrl: true };
+        for (held, over) in [(ctrl, true), (FREE, false)] {
+            let zoom = input.handle(PointerEvent::Wheel(1.0, held), over);
+            assert!(matches!(zoom, Some(Intent::Zoom(f, at)) if f < 1.0 && at == HERE), "{zoom:?}");
+        }
+    }
+
+    #[test]
+    fn a_touchpad_browses_one_notch_at_a_time() {
+        let mut input = at_rest();
+        let scroll = PointerEvent::Scroll(-POINTS_PER_NOTCH * 0.4, FREE);
+        assert_eq!(input.handle(scroll, true), None);
+        assert_eq!(input.handle(scroll, true), None);
+        assert_eq!(input.handle(scroll, true), Some(Intent::Browse(1)));
+        assert_eq!(input.handle(scroll, true), None);
+    }
+
+    #[test]
+    fn another_button_does_not_end_a_drag() {
+        let mut input = at_rest();
+        input.handle(PointerEvent::Pressed(Button::Middle, HERE, FREE), true);
+        input.handle(PointerEvent::Moved(HERE * 2.0), true);
+        assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE * 2.0, FREE), true), None);
+        assert_eq!(input.handle(PointerEvent::Released(Button::Primary, HERE * 2.0), true), None);
+        assert!(input.is_dragging());
+    }
+
+    #[test]
+    fn leaving_hides_the_proposal_but_not_during_a_drag() {
+        let mut input = at_rest();
+        assert_eq!(input.handle(PointerEvent::Gone, false), Some(Intent::Leave));
+        assert_eq!(input.handle(PointerEvent::Wheel(1.0, FREE), false), None);
+        let mut input = at_rest();
+        input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), true);
+        assert_eq!(input.handle(PointerEvent::Gone, false), None);
+    }
+}

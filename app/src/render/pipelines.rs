@@ -1,0 +1,188 @@
+//! The pipelines and the layouts they share. Made once per device and output format.
+
+use super::scene::{SurfaceVertex, ViewUniforms};
+use super::target;
+
+/// A segment of a line, one instance each.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SegmentInstance {
+    pub before: [f32; 3],
+    pub start: [f32; 3],
+    pub end: [f32; 3],
+    pub after: [f32; 3],
+    pub color: [u8; 4],
+    pub style: [f32; 2],
+}
+
+/// A marker, one instance each.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct MarkerInstance {
+    pub position: [f32; 3],
+    pub color: [u8; 4],
+    pub style: [f32; 2],
+}
+
+pub struct Pipelines {
+    pub view_layout: wgpu::BindGroupLayout,
+    pub target_layout: wgpu::BindGroupLayout,
+    pub surface: wgpu::RenderPipeline,
+    pub image: wgpu::RenderPipeline,
+    pub line: wgpu::RenderPipeline,
+    pub marker: wgpu::RenderPipeline,
+}
+
+const SURFACE_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32x2, 4 => Uint32];
+const SEGMENT_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
+    0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Unorm8x4, 5 => Float32x2];
+const MARKER_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4, 2 => Float32x2];
+
+impl Pipelines {
+    pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat) -> Self {
+        let view_layout = view_layout(device);
+        let target_layout = target_layout(device);
+        let surface_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/surface.wgsl"));
+        let overlay_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/overlay.wgsl"));
+        let surface = pipeline(
+            device,
+            &Recipe {
+                label: "surface",
+                shader: &surface_shader,
+                entries: ["vertex_main", "fragment_main"],
+                layouts: &[Some(&view_layout)],
+                buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
+                topology: wgpu::PrimitiveTopology::TriangleList,
+                color: target::COLOR,
+                blend: None,
+                offscreen: true,
+            },
+        );
+        let overlay = |label, entries, buffer: Option<wgpu::VertexBufferLayout<'static>>, blend, topology| {
+            pipeline(
+                device,
+                &Recipe {
+                    label,
+                    shader: &overlay_shader,
+                    entries,
+                    layouts: &[Some(&view_layout), Some(&target_layout)],
+                    buffer,
+                    topology,
+                    color: output,
+                    blend,
+                    offscreen: false,
+                },
+            )
+        };
+        let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let strip = wgpu::PrimitiveTopology::TriangleStrip;
+        let segments = buffer::<SegmentInstance>(wgpu::VertexStepMode::Instance, &SEGMENT_ATTRIBUTES);
+        let markers = buffer::<MarkerInstance>(wgpu::VertexStepMode::Instance, &MARKER_ATTRIBUTES);
+        let image = overlay(
+            "surface image",
+            ["image_vertex", "image_fragment"],
+            None,
+            None,
+            wgpu::PrimitiveTopology::TriangleList,
+        );
+        let line = overlay("lines", ["line_vertex", "line_fragment"], Some(segments), over, strip);
+        let marker = overlay("markers", ["marker_vertex", "marker_fragment"], Some(markers), over, strip);
+        Self { view_layout, target_layout, surface, image, line, marker }
+    }
+}
+
+fn buffer<T>(
+    step_mode: wgpu::VertexStepMode,
+    attributes: &'static [wgpu::VertexAttribute],
+) -> wgpu::VertexBufferLayout<'static> {
+    wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
+}
+
+fn view_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("view"),
+        entries: &[wgpu::BindGroupLayoutEntry {
+            binding: 0,
+            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: std::num::NonZeroU64::new(size_of::<ViewUniforms>() as u64),
+            },
+            count: None,
+        }],
+    })
+}
+
+fn target_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let texture = |binding, sample_type, multisampled| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty: wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled },
+        count: None,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("surface image and depth"),
+        entries: &[
+            texture(0, wgpu::TextureSampleType::Float { filterable: false }, false),
+            texture(1, wgpu::TextureSampleType::Depth, true),
+        ],
+    })
+}
+
+struct Recipe<'a> {
+    label: &'a str,
+    shader: &'a wgpu::ShaderModule,
+    entries: [&'a str; 2],
+    layouts: &'a [Option<&'a wgpu::BindGroupLayout>],
+    buffer: Option<wgpu::VertexBufferLayout<'static>>,
+    topology: wgpu::PrimitiveTopology,
+    color: wgpu::TextureFormat,
+    blend: Option<wgpu::BlendState>,
+    /// Into the multisampled target with depth, or straight into the output.
+    offscreen: bool,
+}
+
+fn pipeline(device: &wgpu::Device, recipe: &Recipe<'_>) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(recipe.label),
+        bind_group_layouts: recipe.layouts,
+        ..Default::default()
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(recipe.label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: recipe.shader,
+            entry_point: Some(recipe.entries[0]),
+            compilation_options: Default::default(),
+            buffers: recipe.buffer.as_ref().map(|b| [Some(b.clone())]).as_ref().map_or(&[], |b| b.as_slice()),
+        },
+        fragment: Some(wgpu::FragmentState {
+            module: recipe.shader,
+            entry_point: Some(recipe.entries[1]),
+            compilation_options: Default::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: recipe.color,
+                blend: recipe.blend,
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        primitive: wgpu::PrimitiveState { topology: recipe.topology, ..Default::default() },
+        depth_stencil: recipe.offscreen.then(|| wgpu::DepthStencilState {
+            format: target::DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: if recipe.offscreen { target::SAMPLES } else { 1 },
+            ..Default::default()
+        },
+        multiview_mask: None,
+        cache: None,
+    })
+}

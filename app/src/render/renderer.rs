@@ -1,0 +1,197 @@
+//! The renderer: keeps what is on the GPU, redraws the surface only when something changed.
+
+use std::sync::Arc;
+
+use super::pipelines::{MarkerInstance, Pipelines, SegmentInstance};
+use super::scene::{Marker, Polyline, SceneInput, SurfaceMesh, Toggles, ViewUniforms};
+use super::target::Target;
+
+/// One picture to draw.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// What.
+    pub scene: SceneInput,
+    /// From where.
+    pub view: ViewUniforms,
+    /// How the surface is drawn.
+    pub toggles: Toggles,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Scale of widths and radii.
+    pub pixels_per_point: f32,
+}
+
+/// Draws [`Frame`]s: [`Self::prepare`], then [`Self::paint`] in a pass of the output format.
+pub struct Renderer {
+    pipelines: Pipelines,
+    uniforms: wgpu::Buffer,
+    view_group: wgpu::BindGroup,
+    target: Option<Target>,
+    surface: Option<(Arc<SurfaceMesh>, Instances)>,
+    lines: Option<(Arc<Vec<Polyline>>, Instances)>,
+    markers: Option<(Arc<Vec<Marker>>, Instances)>,
+    /// What the target shows.
+    drawn: Option<ViewUniforms>,
+    redraws: u64,
+}
+
+/// A buffer of vertices or instances, and how many of it are used.
+struct Instances {
+    buffer: wgpu::Buffer,
+    count: u32,
+}
+
+impl Instances {
+    /// Writes `data` into the buffer of `old` where it fits, else into a new one with room to grow.
+    fn write<T: bytemuck::Pod>(old: Option<Self>, device: &wgpu::Device, queue: &wgpu::Queue, data: &[T]) -> Self {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let needed = bytes.len() as u64;
+        let fits = |i: &Self| i.buffer.size() >= needed && i.buffer.size() / 4 <= needed.max(4096);
+        let buffer = match old.filter(fits) {
+            Some(old) => old.buffer,
+            None => device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size: (needed + needed / 4).next_multiple_of(256).max(256),
+                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+        };
+        queue.write_buffer(&buffer, 0, bytes);
+        Self { buffer, count: data.len() as u32 }
+    }
+}
+
+impl Renderer {
+    /// A renderer whose [`Self::paint`] goes into passes of format `output` (display-encoded, not sRGB).
+    pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat) -> Self {
+        let pipelines = Pipelines::new(device, output);
+        let uniforms = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("view"),
+            size: size_of::<ViewUniforms>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("view"),
+            layout: &pipelines.view_layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniforms.as_entire_binding() }],
+        });
+        Self {
+            pipelines,
+            uniforms,
+            view_group,
+            target: None,
+            surface: None,
+            lines: None,
+            markers: None,
+            drawn: None,
+            redraws: 0,
+        }
+    }
+
+    /// How often the surface was drawn so far.
+    pub fn redraws(&self) -> u64 {
+        self.redraws
+    }
+
+    /// Uploads what changed and redraws the surface if it has to be.
+    pub fn prepare(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        frame: &Frame,
+    ) {
+        let limit = device.limits().max_texture_dimension_2d;
+        let size = frame.size.map(|s| s.clamp(1, limit));
+        let view = frame.view.with_frame(size, frame.toggles, frame.pixels_per_point);
+        let mut dirty = self.drawn != Some(view);
+        if dirty {
+            queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&view));
+        }
+        if self.target.as_ref().is_none_or(|t| t.size != size) {
+            self.target = Some(Target::new(device, &self.pipelines.target_layout, size));
+            dirty = true;
+        }
+        dirty |= upload(&mut self.surface, &frame.scene.surface, |old, surface| {
+            Instances::write(old, device, queue, &surface.vertices)
+        });
+        upload(&mut self.lines, &frame.scene.lines, |old, lines| {
+            let segments: Vec<_> = lines.iter().flat_map(|l| segments(l)).collect();
+            Instances::write(old, device, queue, &segments)
+        });
+        upload(&mut self.markers, &frame.scene.markers, |old, markers| {
+            let instances: Vec<_> = markers.iter().map(marker).collect();
+            Instances::write(old, device, queue, &instances)
+        });
+        if dirty {
+            self.draw_surface(encoder);
+            self.drawn = Some(view);
+        }
+    }
+
+    fn draw_surface(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        let (Some(target), Some((_, surface))) = (&self.target, &self.surface) else { return };
+        let mut pass = target.begin(encoder);
+        self.redraws += 1;
+        if surface.count > 0 {
+            pass.set_pipeline(&self.pipelines.surface);
+            pass.set_bind_group(0, &self.view_group, &[]);
+            pass.set_vertex_buffer(0, surface.buffer.slice(..));
+            pass.draw(0..surface.count, 0..1);
+        }
+    }
+
+    /// Composes the prepared picture into `pass`, whose viewport has the size of the frame.
+    pub fn paint(&self, pass: &mut wgpu::RenderPass<'_>) {
+        let Some(target) = &self.target else { return };
+        pass.set_bind_group(0, &self.view_group, &[]);
+        pass.set_bind_group(1, &target.bind_group, &[]);
+        pass.set_pipeline(&self.pipelines.image);
+        pass.draw(0..3, 0..1);
+        let mut instances = |pipeline, instances: Option<&Instances>| {
+            if let Some(i) = instances.filter(|i| i.count > 0) {
+                pass.set_pipeline(pipeline);
+                pass.set_vertex_buffer(0, i.buffer.slice(..));
+                pass.draw(0..4, 0..i.count);
+            }
+        };
+        instances(&self.pipelines.line, self.lines.as_ref().map(|l| &l.1));
+        instances(&self.pipelines.marker, self.markers.as_ref().map(|m| &m.1));
+    }
+}
+
+/// Replaces `slot` by an upload of `new` unless it holds that very value; returns whether it did.
+fn upload<T>(
+    slot: &mut Option<(Arc<T>, Instances)>,
+    new: &Arc<T>,
+    write: impl FnOnce(Option<Instances>, &T) -> Instances,
+) -> bool {
+    if slot.as_ref().is_some_and(|(held, _)| Arc::ptr_eq(held, new)) {
+        return false;
+    }
+    let old = slot.take().map(|(_, instances)| instances);
+    *slot = Some((Arc::clone(new), write(old, new)));
+    true
+}
+
+fn segments(line: &Polyline) -> impl Iterator<Item = SegmentInstance> {
+    let n = line.points.len();
+    let count = if n < 2 { 0 } else { n - usize::from(!line.closed) };
+    (0..count).map(move |i| {
+        let before = if line.closed { (i + n - 1) % n } else { i.saturating_sub(1) };
+        let after = if line.closed { (i + 2) % n } else { (i + 2).min(n - 1) };
+        SegmentInstance {
+            before: line.points[before],
+            start: line.points[i],
+            end: line.points[(i + 1) % n],
+            after: line.points[after],
+            color: line.color,
+            style: [line.width, line.hidden],
+        }
+    })
+}
+
+fn marker(m: &Marker) -> MarkerInstance {
+    MarkerInstance { position: m.position, color: m.color, style: [m.radius, m.hidden] }
+}

@@ -1,0 +1,126 @@
+//! What can be drawn: plain values, positions in world space, colours in display (gamma) space.
+
+use std::sync::Arc;
+
+use glam::{Mat4, Vec3};
+
+/// A corner of a triangle as the surface shader reads it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SurfaceVertex {
+    /// Position in world space.
+    pub position: [f32; 3],
+    /// Normal; need not have unit length.
+    pub normal: [f32; 3],
+    /// Colour that washes over the material, its strength in alpha.
+    pub tint: [u8; 4],
+    /// Coordinates across the strips of both families: a line is drawn wherever one is a whole number.
+    pub stripe: [f32; 2],
+    /// [`Self::COVERED_U`] and [`Self::COVERED_V`].
+    pub flags: u32,
+}
+
+impl SurfaceVertex {
+    /// Flag: a strip of the first family covers the triangle.
+    pub const COVERED_U: u32 = 1;
+    /// Flag: a strip of the second family covers the triangle.
+    pub const COVERED_V: u32 = 2;
+}
+
+/// Triangles, each with three corners of its own.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceMesh {
+    /// Three per triangle.
+    pub vertices: Vec<SurfaceVertex>,
+}
+
+/// A line of constant width on the screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polyline {
+    /// The points in order; a closed line does not repeat its first.
+    pub points: Vec<[f32; 3]>,
+    /// Whether the last point joins the first.
+    pub closed: bool,
+    /// Red, green, blue, alpha; not premultiplied.
+    pub color: [u8; 4],
+    /// Width in points.
+    pub width: f32,
+    /// How much of its colour a part behind the surface keeps, from 0 to 1.
+    pub hidden: f32,
+}
+
+/// A disc of constant size on the screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Centre in world space.
+    pub position: [f32; 3],
+    /// Red, green, blue, alpha; not premultiplied.
+    pub color: [u8; 4],
+    /// Radius in points.
+    pub radius: f32,
+    /// How much of its colour the marker keeps behind the surface, from 0 to 1.
+    pub hidden: f32,
+}
+
+/// Everything of one picture but the view. The parts are shared, and uploaded again only when they are others.
+#[derive(Debug, Clone, Default)]
+pub struct SceneInput {
+    /// The surface.
+    pub surface: Arc<SurfaceMesh>,
+    /// Lines, later ones over earlier ones.
+    pub lines: Arc<Vec<Polyline>>,
+    /// Markers, over all lines.
+    pub markers: Arc<Vec<Marker>>,
+}
+
+/// What of the surface is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Toggles {
+    /// The stripe pattern of the strips.
+    pub stripes: bool,
+    /// The edges of the triangles.
+    pub wireframe: bool,
+    /// The colours of the regions.
+    pub tint: bool,
+}
+
+impl Default for Toggles {
+    fn default() -> Self {
+        Self { stripes: true, wireframe: false, tint: true }
+    }
+}
+
+/// The view as the shaders read it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct ViewUniforms {
+    clip_from_world: [[f32; 4]; 4],
+    axes: [[f32; 4]; 3],
+    eye: [f32; 4],
+    size_and_planes: [f32; 4],
+    toggles: [f32; 4],
+}
+
+impl ViewUniforms {
+    /// A perspective view: `clip_from_view` with depth from 0 (near) to 1 (far), a rigid `view_from_world`, the
+    /// distances of both planes. Size and toggles are filled in by the renderer.
+    pub fn new(clip_from_view: Mat4, view_from_world: Mat4, near: f32, far: f32) -> Self {
+        let world_from_view = view_from_world.inverse();
+        let axis = |i: usize| world_from_view.col(i).to_array();
+        Self {
+            clip_from_world: (clip_from_view * view_from_world).to_cols_array_2d(),
+            axes: [axis(0), axis(1), axis(2)],
+            eye: world_from_view.transform_point3(Vec3::ZERO).extend(1.0).to_array(),
+            size_and_planes: [1.0, 1.0, near, far],
+            toggles: [0.0; 4],
+        }
+    }
+
+    pub(super) fn with_frame(mut self, size: [u32; 2], toggles: Toggles, pixels_per_point: f32) -> Self {
+        self.size_and_planes[0] = size[0] as f32;
+        self.size_and_planes[1] = size[1] as f32;
+        let on = |b: bool| f32::from(u8::from(b));
+        self.toggles = [on(toggles.stripes), on(toggles.wireframe), on(toggles.tint), pixels_per_point];
+        self
+    }
+}

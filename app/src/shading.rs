@@ -1,0 +1,203 @@
+//! From an engine's snapshot to what the renderer draws: triangles with colours and stripes, lines, markers.
+
+use glam::{DVec3, Vec3};
+
+use crate::engine::{DisplaySurface, LayoutPreview, Proposal, RegionColor, Scene, StripId};
+use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
+
+/// Placed strips.
+pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
+/// The selected strip.
+pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
+/// What a click would place.
+pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
+/// Arcs of the layout.
+pub const ARC: [u8; 4] = [0x24, 0x26, 0x2a, 0xff];
+/// Regular nodes of the layout.
+pub const NODE: [u8; 4] = [0x5a, 0x5e, 0x66, 0xff];
+/// Irregular nodes of valence below and above the regular one.
+pub const IRREGULAR: [[u8; 4]; 2] = [[0xd2, 0x3c, 0x3c, 0xff], [0x25, 0x63, 0xc9, 0xff]];
+/// A pale seam that keeps a line apart from the stripes it runs on.
+const SEAM: [u8; 4] = [0xff, 0xff, 0xff, 0xb4];
+
+/// The colour of a region as the panels show it.
+pub fn region_rgb(color: RegionColor) -> [u8; 3] {
+    match color {
+        RegionColor::None => [0x3d, 0x9b, 0x5f],
+        RegionColor::Yellow => [0xe3, 0xc0, 0x1c],
+        RegionColor::Orange => [0xee, 0x8a, 0x1d],
+        RegionColor::Red => [0xd9, 0x3b, 0x36],
+    }
+}
+
+/// The wash over the surface: urgent colours wash more strongly.
+fn tint(color: RegionColor) -> [u8; 4] {
+    let [r, g, b] = region_rgb(color);
+    match color {
+        RegionColor::None => [0; 4],
+        RegionColor::Yellow => [r, g, b, 0x70],
+        RegionColor::Orange => [r, g, b, 0x80],
+        RegionColor::Red => [r, g, b, 0x80],
+    }
+}
+
+/// The surface as triangles.
+pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
+    let mut vertices = Vec::with_capacity(display.faces.len() * 3);
+    for (f, face) in display.faces.iter().enumerate() {
+        let tint = display.regions.get(f).map_or([0; 4], |&c| tint(c));
+        let stripes = display.stripes.get(f).map_or([[0.0; 2]; 3], |s| relative_to_whole(*s));
+        let flags = display.covered.get(f).map_or(0, |&[u, v]| {
+            (if u { SurfaceVertex::COVERED_U } else { 0 }) | (if v { SurfaceVertex::COVERED_V } else { 0 })
+        });
+        for corner in 0..3 {
+            let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
+            let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
+            vertices.push(SurfaceVertex {
+                position: position.as_vec3().to_array(),
+                normal: normal.as_vec3().to_array(),
+                tint,
+                stripe: stripes[corner].map(|s| s as f32),
+                flags,
+            });
+        }
+    }
+    SurfaceMesh { vertices }
+}
+
+/// Coordinates less their whole part, which the pattern does not show but single precision would lose digits to.
+fn relative_to_whole(corners: [[f64; 2]; 3]) -> [[f64; 2]; 3] {
+    let whole = corners[0].map(f64::floor);
+    corners.map(|c| [c[0] - whole[0], c[1] - whole[1]])
+}
+
+/// Centre and radius of a sphere around all of the surface: around its box's centre.
+pub fn bounding_sphere(display: &DisplaySurface) -> (Vec3, f32) {
+    let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    display.positions.iter().for_each(|&p| bounds = (bounds.0.min(p), bounds.1.max(p)));
+    if !bounds.0.is_finite() || !bounds.1.is_finite() {
+        return (Vec3::ZERO, 0.5);
+    }
+    let centre = (bounds.0 + bounds.1) * 0.5;
+    let radius = display.positions.iter().map(|p| p.distance(centre)).fold(1e-3, f64::max);
+    (centre.as_vec3(), radius as f32)
+}
+
+/// Normals at the corners of each face: the mean, weighted by angle, over neighbours that turn by less than
+/// `crease` (radians) against the face itself, so that sharp edges stay sharp.
+pub fn corner_normals(positions: &[DVec3], faces: &[[u32; 3]], crease: f64) -> Vec<[DVec3; 3]> {
+    let normal = |f: &[u32; 3]| {
+        let [a, b, c] = f.map(|v| positions[v as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let normals: Vec<DVec3> = faces.iter().map(normal).collect();
+    let mut starts = vec![0u32; positions.len() + 1];
+    faces.iter().flatten().for_each(|&v| starts[v as usize + 1] += 1);
+    for v in 0..positions.len() {
+        starts[v + 1] += starts[v];
+    }
+    let mut next = starts.clone();
+    let mut around = vec![(0u32, 0.0f64); faces.len() * 3];
+    for (f, face) in faces.iter().enumerate() {
+        for i in 0..3 {
+            let [p, q, r] = [0, 1, 2].map(|k| positions[face[(i + k) % 3] as usize]);
+            let v = face[i] as usize;
+            let angle = (q - p).angle_between(r - p);
+            around[next[v] as usize] = (f as u32, if angle.is_finite() { angle } else { 0.0 });
+            next[v] += 1;
+        }
+    }
+    let limit = crease.cos();
+    let at = |f: usize, v: u32| {
+        let list = &around[starts[v as usize] as usize..starts[v as usize + 1] as usize];
+        let smooth = list.iter().filter(|(g, _)| normals[f].dot(normals[*g as usize]) > limit);
+        let sum: DVec3 = smooth.map(|&(g, angle)| normals[g as usize] * angle).sum();
+        sum.try_normalize().unwrap_or(normals[f])
+    };
+    faces.iter().enumerate().map(|(f, face)| face.map(|v| at(f, v))).collect()
+}
+
+/// What is drawn over the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Overlay<'a> {
+    /// The design.
+    pub scene: &'a Scene,
+    /// What a click would place.
+    pub proposal: Option<&'a Proposal>,
+    /// The strip selected in the list.
+    pub selected: Option<StripId>,
+    /// Whether arcs and nodes are shown where there are some.
+    pub layout: bool,
+    /// Whether placed strips are shown.
+    pub strips: bool,
+    /// A place that a message speaks of.
+    pub place: Option<DVec3>,
+}
+
+/// The lines and markers of an overlay.
+pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
+    let mut lines = Vec::new();
+    let mut markers = Vec::new();
+    if o.strips {
+        for strip in o.scene.strips.iter().filter(|s| s.visible) {
+            let selected = o.selected == Some(strip.id);
+            let (color, width) = if selected { (SELECTED, 4.5) } else { (PLACED, 2.6) };
+            seamed(&mut lines, points(&strip.polyline), strip.closed, color, width);
+        }
+    }
+    if let Some(layout) = o.scene.layout.as_deref().filter(|_| o.layout) {
+        draw_layout(layout, &mut lines, &mut markers);
+    }
+    if let Some(proposal) = o.proposal {
+        seamed(&mut lines, points(&proposal.polyline), proposal.curve.closed, PROPOSED, 3.6);
+    }
+    if let Some(place) = o.place {
+        let position = place.as_vec3().to_array();
+        markers.push(Marker { position, color: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5 });
+    }
+    (lines, markers)
+}
+
+fn draw_layout(layout: &LayoutPreview, lines: &mut Vec<Polyline>, markers: &mut Vec<Marker>) {
+    for arc in &layout.arcs {
+        lines.push(Polyline { points: points(arc), closed: false, color: ARC, width: 2.2, hidden: 0.10 });
+    }
+    for node in &layout.nodes {
+        let (color, radius) = match (node.irregular, node.valence < 4) {
+            (false, _) => (NODE, 3.4),
+            (true, low) => (IRREGULAR[usize::from(!low)], 5.6),
+        };
+        markers.push(Marker { position: node.position.as_vec3().to_array(), color, radius, hidden: 0.12 });
+    }
+}
+
+fn seamed(lines: &mut Vec<Polyline>, points: Vec<[f32; 3]>, closed: bool, color: [u8; 4], width: f32) {
+    lines.push(Polyline { points: points.clone(), closed, color: SEAM, width: width + 2.4, hidden: 0.0 });
+    lines.push(Polyline { points, closed, color, width, hidden: 0.13 });
+}
+
+fn points(line: &[DVec3]) -> Vec<[f32; 3]> {
+    line.iter().map(|p| p.as_vec3().to_array()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sharp_edges_keep_their_normals_and_soft_ones_share() {
+        let up = |z: f64| vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(-1.0, 0.0, z)];
+        let faces = [[0, 1, 2], [0, 2, 3]];
+        let soft = corner_normals(&up(0.1), &faces, 0.7);
+        assert!(soft[0][0].distance(soft[1][0]) < 1e-12 && soft[0][1] == DVec3::Z);
+        let sharp = corner_normals(&up(-2.0), &faces, 0.7);
+        assert_eq!(sharp[0][0], DVec3::Z);
+        assert!(sharp[1][0].dot(DVec3::Z) < 0.6);
+    }
+
+    #[test]
+    fn stripes_lose_only_their_whole_part() {
+        let moved = relative_to_whole([[1000.25, -3.5], [1001.0, -3.0], [1000.5, -4.25]]);
+        assert_eq!(moved, [[0.25, 0.5], [1.0, 1.0], [0.5, -0.25]]);
+    }
+}

@@ -1,0 +1,252 @@
+//! The engine of the window: a session of the library behind [`Engine`], with its snapshots.
+
+mod snapshot;
+mod words;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use plait_core::dual::{Arrangement, Colour};
+use plait_core::layout::{LayoutError, QuadLayout, embed};
+use plait_core::mesh::builtin_names;
+use plait_core::progress::Progress;
+use plait_core::surface::SurfacePoint;
+use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
+
+use crate::engine::{
+    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal,
+    Refinement, Scene, Source, StripId,
+};
+
+/// File name ending of designs.
+const DESIGN: &str = "plait";
+
+/// Opens sessions.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SessionOpener;
+
+impl Opener for SessionOpener {
+    fn built_ins(&self) -> Vec<BuiltIn> {
+        builtin_names().map(|name| BuiltIn { name: name.into(), hint: String::new() }).collect()
+    }
+
+    fn open(&self, source: &Source, progress: &Progress) -> Result<Box<dyn Engine>, EngineError> {
+        progress.report("Reading", 0.0);
+        let session = match source {
+            Source::BuiltIn(name) => start(MeshSource::Builtin(name.clone()), progress)?,
+            Source::File(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(DESIGN)) => {
+                let design = Design::read(path).map_err(plain)?;
+                let folder = path.parent().unwrap_or(Path::new("."));
+                let loaded = design.mesh.load(folder).map_err(plain)?;
+                progress.check()?;
+                let mut session = Session::resume(loaded, design, progress).map_err(plain)?;
+                if let MeshSource::File(mesh) = &session.design().mesh {
+                    let mesh = absolute(&folder.join(mesh));
+                    session.set_source(MeshSource::File(mesh));
+                }
+                session
+            }
+            Source::File(path) => start(MeshSource::File(absolute(path)), progress)?,
+        };
+        Ok(Box::new(SessionEngine::new(session)))
+    }
+}
+
+fn start(source: MeshSource, progress: &Progress) -> Result<Session, EngineError> {
+    let loaded = source.load(Path::new("")).map_err(plain)?;
+    progress.check()?;
+    Session::open(loaded, source, Options::default(), progress).map_err(plain)
+}
+
+/// A path that stays valid when the program runs in another folder.
+fn absolute(path: &Path) -> std::path::PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}
+
+fn plain(error: impl Into<WeaveError>) -> EngineError {
+    failed(error.into(), None)
+}
+
+/// The error in the terms of the window; a region it names becomes a place.
+fn failed(error: WeaveError, session: Option<&Session>) -> EngineError {
+    let region = match &error {
+        WeaveError::Cancelled(_) => return EngineError::Cancelled,
+        WeaveError::Layout(LayoutError::RedRegions(red)) => red.first().copied(),
+        WeaveError::Stuck(Stuck::NoHelp { region, .. }) => Some(*region),
+        _ => None,
+    };
+    let place = region.zip(session).and_then(|(r, s)| region_place(&s.woven().arrangement, r as usize));
+    let message = match (&error, session) {
+        (WeaveError::Layout(LayoutError::RedRegions(_)), Some(s)) => {
+            let reasons: Vec<_> = words::remains(s).into_iter().map(|r| r.text).collect();
+            format!("there is no layout yet: {}", reasons.join("; "))
+        }
+        _ => error.to_string(),
+    };
+    EngineError::Failed { message, place }
+}
+
+/// A point in the middle of a region's surface: of its face nearest to the mean.
+fn region_place(arrangement: &Arrangement, region: usize) -> Option<DVec3> {
+    let faces = &arrangement.regions.get(region)?.faces;
+    let middle = |f: u32| {
+        arrangement.refined.corners(f).map(|v| arrangement.refined.positions[v as usize]).iter().sum::<DVec3>() / 3.0
+    };
+    let mean = faces.iter().map(|&f| middle(f)).sum::<DVec3>() / faces.len().max(1) as f64;
+    let nearest = |&a: &DVec3, &b: &DVec3| a.distance_squared(mean).total_cmp(&b.distance_squared(mean));
+    faces.iter().map(|&f| middle(f)).min_by(nearest)
+}
+
+/// A session and its present snapshot.
+struct SessionEngine {
+    session: Session,
+    scene: Arc<Scene>,
+    /// The layout of the strips that it was made for, if they make one.
+    preview: Option<(Arc<Woven>, Option<Arc<LayoutPreview>>)>,
+    model: snapshot::ModelSnapshot,
+}
+
+impl SessionEngine {
+    fn new(session: Session) -> Self {
+        let model = snapshot::ModelSnapshot::new(&session);
+        let scene = Arc::new(model.scene(&session, None));
+        Self { session, scene, preview: None, model }
+    }
+
+    fn refresh(&mut self) {
+        let current = self.preview.as_ref().filter(|(woven, _)| Arc::ptr_eq(woven, self.session.woven()));
+        let preview = current.and_then(|(_, preview)| preview.clone());
+        self.scene = Arc::new(self.model.scene(&self.session, preview));
+    }
+
+    fn changed<T>(&mut self, result: Result<T, WeaveError>) -> Result<T, EngineError> {
+        let value = result.map_err(|e| failed(e, Some(&self.session)))?;
+        self.refresh();
+        Ok(value)
+    }
+
+    fn proposal(&self, proposal: weave::Proposal) -> Proposal {
+        let polyline = proposal.points(&self.session.model().mesh);
+        Proposal { curve: proposal.curve, cost: proposal.cost, polyline }
+    }
+}
+
+impl Engine for SessionEngine {
+    fn proposals(
+        &mut self,
+        at: SurfacePoint,
+        first: &mut dyn FnMut(Proposal),
+        progress: &Progress,
+    ) -> Result<Vec<Proposal>, EngineError> {
+        let mesh = Arc::clone(&self.session.model().mesh);
+        let shown = |p: weave::Proposal| Proposal { polyline: p.points(&mesh), curve: p.curve, cost: p.cost };
+        let found = self.session.proposals_with(at, progress, |p| first(shown(p)));
+        Ok(found.map_err(plain)?.into_iter().map(|p| self.proposal(p)).collect())
+    }
+
+    fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError> {
+        let proposal = weave::Proposal { curve: proposal.curve.clone(), cost: proposal.cost };
+        let placed = self.session.place(proposal, progress);
+        self.changed(placed).map(|id| StripId(id.0))
+    }
+
+    fn remove(&mut self, strip: StripId, progress: &Progress) -> Result<(), EngineError> {
+        let removed = self.session.remove(weave::StripId(strip.0), progress);
+        self.changed(removed)
+    }
+
+    fn undo(&mut self, progress: &Progress) -> Result<(), EngineError> {
+        let done = self.session.undo(progress);
+        self.changed(done)
+    }
+
+    fn redo(&mut self, progress: &Progress) -> Result<(), EngineError> {
+        let done = self.session.redo(progress);
+        self.changed(done)
+    }
+
+    fn set_visible(&mut self, strip: StripId, visible: bool) -> Result<(), EngineError> {
+        let set = self.session.set_visible(weave::StripId(strip.0), visible);
+        self.changed(set)
+    }
+
+    fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError> {
+        // A valid layout first; then corners of the shape are told apart.
+        let goal = if self.session.woven().count(Colour::Red) > 0 { Goal::Valid } else { Goal::Separated };
+        let found = self.session.suggest(goal, progress).map_err(|e| failed(e, Some(&self.session)))?;
+        Ok(self.proposal(found))
+    }
+
+    fn scene(&self) -> Arc<Scene> {
+        Arc::clone(&self.scene)
+    }
+
+    fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError> {
+        if self.preview.as_ref().is_some_and(|(woven, _)| Arc::ptr_eq(woven, self.session.woven())) {
+            return Ok(false);
+        }
+        let preview = match layout_preview(&self.session, progress) {
+            Ok(preview) => Some(Arc::new(preview)),
+            Err(WeaveError::Cancelled(_)) => return Err(EngineError::Cancelled),
+            Err(error) => {
+                tracing::debug!(%error, "no layout is shown");
+                None
+            }
+        };
+        let shown = preview.is_some();
+        self.preview = Some((Arc::clone(self.session.woven()), preview));
+        if shown {
+            self.refresh();
+        }
+        Ok(shown)
+    }
+
+    fn save(&self, path: &Path) -> Result<(), EngineError> {
+        self.session.design().write(path).map_err(plain)
+    }
+
+    fn export(
+        &mut self,
+        folder: &Path,
+        options: &ExportOptions,
+        progress: &Progress,
+    ) -> Result<ExportReport, EngineError> {
+        let size = match options.refinement {
+            Refinement::Quads(count) => QuadSize::Count(u32::try_from(count).unwrap_or(u32::MAX)),
+            Refinement::EdgeLength(length) => QuadSize::EdgeLength(length),
+        };
+        let written =
+            weave::write_all(&self.session, &weave::ExportOptions { size }, folder, Default::default(), progress);
+        let export = written.and_then(|result| result).map_err(|e| failed(e, Some(&self.session)))?;
+        let (nodes, patches) = (&export.layout.nodes, &export.layout.patches);
+        let summary = format!(
+            "{} patches, {} nodes ({} irregular), {} quads",
+            patches.len(),
+            nodes.len(),
+            export.layout.n_irregular(),
+            export.quads.quads.len()
+        );
+        let files = ["design.plait", "layout.obj", "quads.obj", "patches.obj", "report.json"];
+        Ok(ExportReport { files: files.map(|f| folder.join(f)).to_vec(), summary })
+    }
+}
+
+/// Nodes and arcs of the layout on the surface.
+fn layout_preview(session: &Session, progress: &Progress) -> Result<LayoutPreview, WeaveError> {
+    let (model, woven) = (session.model(), session.woven());
+    let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
+    let only = |r: &plait_core::dual::RegionReport| (r.corners.len() == 1).then(|| r.corners[0].0);
+    let preferred: Vec<_> = woven.reports.iter().map(only).collect();
+    let embedding = embed(&woven.arrangement, &layout, &preferred, progress)?;
+    let position = |&v: &u32| embedding.mesh.positions[v as usize];
+    let node = |(node, v): (&plait_core::layout::Node, &u32)| LayoutNode {
+        position: position(v),
+        valence: node.valence as u32,
+        irregular: !node.is_regular(),
+    };
+    Ok(LayoutPreview {
+        arcs: embedding.arcs.iter().map(|arc| arc.iter().map(position).collect()).collect(),
+        nodes: layout.nodes.iter().zip(&embedding.nodes).map(node).collect(),
+    })
+}

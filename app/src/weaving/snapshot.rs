@@ -1,0 +1,150 @@
+//! Snapshots of a session for the window.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use plait_core::dual::RefinedMesh;
+use plait_core::mesh::{FaceId, TriMesh};
+use plait_core::weave::Session;
+
+use super::words;
+use crate::engine::{DisplaySurface, LayoutPreview, ModelFacts, Scene, Strip, StripId};
+use crate::shading::corner_normals;
+
+/// What stays the same while strips come and go.
+pub struct ModelSnapshot {
+    facts: Arc<ModelFacts>,
+    /// Normals at the corners of the faces of the design mesh.
+    normals: Vec<[DVec3; 3]>,
+}
+
+impl ModelSnapshot {
+    pub fn new(session: &Session) -> Self {
+        let model = session.model();
+        let faces: Vec<[u32; 3]> = model.mesh.faces().map(|f| model.mesh.face_vertices(f).map(|v| v.0)).collect();
+        let normals = corner_normals(model.mesh.positions(), &faces, model.options.sharp_dihedral);
+        Self { facts: Arc::new(facts(session)), normals }
+    }
+
+    /// The present state of `session`.
+    pub fn scene(&self, session: &Session, layout: Option<Arc<LayoutPreview>>) -> Scene {
+        let (model, design) = (session.model(), session.design());
+        let (summary, exportable) = words::summary(session);
+        let strips = design.strips.iter().map(|s| Strip {
+            id: StripId(s.id.0),
+            polyline: s.curve.points(&model.mesh),
+            closed: s.curve.closed,
+            length: s.curve.length(&model.mesh) * model.loaded.units.scale,
+            visible: s.visible,
+        });
+        Scene {
+            model: Arc::clone(&self.facts),
+            design_mesh: Arc::clone(&model.mesh),
+            surface: Arc::new(self.surface(session)),
+            strips: strips.collect(),
+            remains: words::remains(session),
+            summary,
+            exportable,
+            layout,
+            can_undo: session.can_undo(),
+            can_redo: session.can_redo(),
+        }
+    }
+
+    fn surface(&self, session: &Session) -> DisplaySurface {
+        let (mesh, woven) = (&session.model().mesh, session.woven());
+        let refined = &woven.arrangement.refined;
+        let faces: Vec<[u32; 3]> = (0..refined.n_faces() as u32).map(|f| refined.corners(f)).collect();
+        let normals = (0..faces.len() as u32).map(|f| self.face_normals(mesh, refined, f)).collect();
+        // Before the first strip all is one region; to paint it red would say nothing.
+        let regions = if session.design().strips.is_empty() {
+            Vec::new()
+        } else {
+            let color = |&r: &u32| words::color(woven.reports[r as usize].colour);
+            woven.arrangement.region_of_face.iter().map(color).collect()
+        };
+        DisplaySurface {
+            positions: refined.positions.clone(),
+            faces,
+            normals,
+            regions,
+            stripes: Vec::new(),
+            covered: Vec::new(),
+        }
+    }
+
+    /// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.
+    fn face_normals(&self, mesh: &TriMesh, refined: &RefinedMesh, f: u32) -> [DVec3; 3] {
+        let base = FaceId(refined.base_face(f));
+        let corners = mesh.face_vertices(base);
+        let normals = self.normals[base.index()];
+        refined.corners(f).map(|v| match corners.iter().position(|c| c.0 == v) {
+            Some(corner) => normals[corner],
+            None => {
+                let weights = weights(corners.map(|c| mesh.position(c)), refined.positions[v as usize]);
+                (0..3).map(|i| normals[i] * weights[i]).sum()
+            }
+        })
+    }
+}
+
+/// The barycentric coordinates of `p`, which lies in the triangle's plane.
+fn weights(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let part = |i: usize| (corners[(i + 1) % 3] - p).cross(corners[(i + 2) % 3] - p).dot(normal).max(0.0);
+    let parts = [part(0), part(1), part(2)];
+    let sum: f64 = parts.iter().sum();
+    if sum > 0.0 { parts.map(|p| p / sum) } else { [1.0 / 3.0; 3] }
+}
+
+fn facts(session: &Session) -> ModelFacts {
+    let model = session.model();
+    let mut facts = vec![
+        ("Vertices".to_owned(), grouped(model.mesh.n_vertices())),
+        ("Triangles".to_owned(), grouped(model.mesh.n_faces())),
+        ("Genus".to_owned(), model.topology.genus.to_string()),
+    ];
+    let mut several = |name: &str, n: usize, usual: usize| {
+        if n != usual {
+            facts.push((name.to_owned(), grouped(n)));
+        }
+    };
+    several("Parts", model.topology.components.len(), 1);
+    several("Boundary loops", model.topology.boundary_loops.len(), 0);
+    ModelFacts {
+        name: model.loaded.name.clone(),
+        facts,
+        repairs: model.loaded.repairs.iter().map(ToString::to_string).collect(),
+    }
+}
+
+/// A number with its digits in groups of three.
+fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_grouped() {
+        assert_eq!([0, 999, 1000, 1234567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
+    }
+
+    #[test]
+    fn weights_add_to_one_and_find_the_point() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.2, 0.9, 0.4)];
+        let p = corners[0] * 0.2 + corners[1] * 0.5 + corners[2] * 0.3;
+        let w = weights(corners, p);
+        assert!((w[0] - 0.2).abs() < 1e-12 && (w[1] - 0.5).abs() < 1e-12 && (w[2] - 0.3).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,255 @@
+//! File dialogs, on threads of their own so that the window goes on.
+//!
+//! The system's dialog comes through the desktop portal. A machine without one answers "nothing chosen" at once;
+//! since nobody presses Cancel that fast, such an answer opens a plain dialog of our own instead.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+/// A dialog that comes back empty sooner was never shown.
+const NEVER_SHOWN: Duration = Duration::from_millis(400);
+/// What can be opened.
+const OPENABLE: [&str; 5] = ["obj", "off", "ply", "stl", "plait"];
+
+/// What a dialog asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// A mesh or design to read.
+    Open,
+    /// A design to write.
+    Save,
+    /// A folder to export into.
+    Export,
+}
+
+impl Asked {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Open => "Open a mesh or a design",
+            Self::Save => "Save the design",
+            Self::Export => "Export the layout into a folder",
+        }
+    }
+}
+
+enum Answer {
+    Chosen(Asked, PathBuf),
+    NothingChosen,
+    NoDialog(Asked),
+}
+
+/// The dialogs that are open.
+pub struct Dialogs {
+    /// Name without extension to offer for a new file.
+    pub suggested_name: String,
+    sender: Sender<Answer>,
+    receiver: Receiver<Answer>,
+    waiting: bool,
+    plain: Option<Plain>,
+    ready: Vec<(Asked, PathBuf)>,
+}
+
+impl Default for Dialogs {
+    fn default() -> Self {
+        let (sender, receiver) = channel();
+        Self { suggested_name: String::new(), sender, receiver, waiting: false, plain: None, ready: Vec::new() }
+    }
+}
+
+impl Dialogs {
+    /// Opens a dialog unless one is open.
+    pub fn ask(&mut self, asked: Asked, ctx: &egui::Context) {
+        if self.waiting || self.plain.is_some() {
+            return;
+        }
+        let (sender, ctx, name) = (self.sender.clone(), ctx.clone(), self.file_name(asked));
+        let run = move || {
+            let start = Instant::now();
+            let answer = match system_dialog(asked, &name) {
+                Some(path) => Answer::Chosen(asked, path),
+                None if start.elapsed() < NEVER_SHOWN => Answer::NoDialog(asked),
+                None => Answer::NothingChosen,
+            };
+            drop(sender.send(answer));
+            ctx.request_repaint();
+        };
+        match std::thread::Builder::new().name("dialog".into()).spawn(run) {
+            Ok(_) => self.waiting = true,
+            Err(_) => self.plain = Some(Plain::new(asked, &self.file_name(asked))),
+        }
+    }
+
+    fn file_name(&self, asked: Asked) -> String {
+        let stem = Path::new(&self.suggested_name).file_stem().map(|s| s.to_string_lossy().to_lowercase());
+        let stem = stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "design".into());
+        match asked {
+            Asked::Open => String::new(),
+            Asked::Save => format!("{stem}.plait"),
+            Asked::Export => format!("{stem}-layout"),
+        }
+    }
+
+    /// What was chosen since the last call.
+    pub fn answers(&mut self) -> Vec<(Asked, PathBuf)> {
+        while let Ok(answer) = self.receiver.try_recv() {
+            self.waiting = false;
+            match answer {
+                Answer::Chosen(asked, path) => self.ready.push((asked, path)),
+                Answer::NothingChosen => {}
+                Answer::NoDialog(asked) => self.plain = Some(Plain::new(asked, &self.file_name(asked))),
+            }
+        }
+        std::mem::take(&mut self.ready)
+    }
+
+    /// Draws the plain dialog, if it is open.
+    pub fn show(&mut self, ctx: &egui::Context) {
+        let Some(plain) = &mut self.plain else { return };
+        match plain.show(ctx) {
+            Some(Some(path)) => {
+                self.ready.push((plain.asked, path));
+                self.plain = None;
+                ctx.request_repaint();
+            }
+            Some(None) => self.plain = None,
+            None => {}
+        }
+    }
+}
+
+fn system_dialog(asked: Asked, name: &str) -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new().set_title(asked.title());
+    match asked {
+        Asked::Open => dialog.add_filter("Meshes and designs", &OPENABLE).pick_file(),
+        Asked::Save => dialog.add_filter("Plait design", &["plait"]).set_file_name(name).save_file(),
+        Asked::Export => dialog.pick_folder(),
+    }
+}
+
+/// A plain dialog: a folder's entries and a line for the path.
+struct Plain {
+    asked: Asked,
+    folder: PathBuf,
+    name: String,
+    entries: Vec<(String, bool)>,
+    trouble: Option<String>,
+}
+
+impl Plain {
+    fn new(asked: Asked, name: &str) -> Self {
+        let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("/"));
+        let mut plain = Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None };
+        plain.list();
+        plain
+    }
+
+    /// Reads the folder: sub-folders, then the files that can be opened.
+    fn list(&mut self) {
+        self.entries.clear();
+        self.trouble = None;
+        let read = match std::fs::read_dir(&self.folder) {
+            Ok(read) => read,
+            Err(e) => {
+                self.trouble = Some(format!("{} cannot be read: {e}", self.folder.display()));
+                return;
+            }
+        };
+        for entry in read.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let folder = entry.path().is_dir();
+            let known = Path::new(&name).extension().is_some_and(|e| {
+                let e = e.to_string_lossy().to_lowercase();
+                OPENABLE.contains(&e.as_str())
+            });
+            if !name.starts_with('.') && (folder || (known && self.asked != Asked::Export)) {
+                self.entries.push((name, folder));
+            }
+        }
+        self.entries.sort_by(|a, b| (!a.1, a.0.to_lowercase()).cmp(&(!b.1, b.0.to_lowercase())));
+    }
+
+    fn enter(&mut self, folder: PathBuf) {
+        self.folder = folder;
+        self.list();
+    }
+
+    /// The path that the name line means: a folder is entered, unless a folder is what is asked for.
+    fn accept(&mut self) -> Option<PathBuf> {
+        let path = self.folder.join(self.name.trim());
+        if self.asked != Asked::Export && path.is_dir() {
+            self.name.clear();
+            self.enter(path);
+            return None;
+        }
+        if self.asked == Asked::Open && !path.is_file() {
+            self.trouble = Some(format!("There is no file {}", path.display()));
+            return None;
+        }
+        Some(path)
+    }
+
+    /// `Some(Some(path))` when chosen, `Some(None)` when cancelled.
+    fn show(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
+        let mut result = None;
+        let response = egui::Modal::new(egui::Id::unique("file dialog")).show(ctx, |ui| {
+            ui.set_width(520.0);
+            ui.heading(self.asked.title());
+            ui.horizontal(|ui| {
+                if ui.button("Up").clicked()
+                    && let Some(parent) = self.folder.parent().map(Path::to_path_buf)
+                {
+                    self.enter(parent);
+                }
+                ui.add(egui::Label::new(self.folder.display().to_string()).truncate());
+            });
+            self.list_entries(ui, &mut result);
+            ui.horizontal(|ui| {
+                let label = ui.label("Name");
+                let width = (ui.available_width() - 4.0).max(60.0);
+                let line =
+                    ui.add(egui::TextEdit::singleline(&mut self.name).desired_width(width)).labelled_by(label.id);
+                if line.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
+                    result = self.accept().map(Some);
+                }
+            });
+            if let Some(trouble) = &self.trouble {
+                ui.colored_label(super::theme::BAD, trouble);
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let verb = match self.asked {
+                    Asked::Open => "Open",
+                    Asked::Save => "Save",
+                    Asked::Export => "Export",
+                };
+                if ui.button(verb).clicked() {
+                    result = self.accept().map(Some);
+                }
+                if ui.button("Cancel").clicked() {
+                    result = Some(None);
+                }
+            });
+        });
+        if result.is_none() && response.should_close() { Some(None) } else { result }
+    }
+
+    fn list_entries(&mut self, ui: &mut egui::Ui, result: &mut Option<Option<PathBuf>>) {
+        let mut enter = None;
+        egui::ScrollArea::vertical().max_height(280.0).auto_shrink([false, false]).show(ui, |ui| {
+            for (name, folder) in &self.entries {
+                let text = if *folder { format!("{name}/") } else { name.clone() };
+                let response = ui.selectable_label(*name == self.name, text);
+                if response.clicked() && *folder {
+                    enter = Some(self.folder.join(name));
+                } else if response.double_clicked() {
+                    *result = Some(Some(self.folder.join(name)));
+                } else if response.clicked() {
+                    self.name.clone_from(name);
+                }
+            }
+        });
+        if let Some(folder) = enter {
+            self.enter(folder);
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! The worker: a thread that owns the engine, so that the window never waits.
+//!
+//! Requests that change something are queued and done in order. Of hover requests only the latest counts: a newer
+//! one, or any change, cancels the one being worked on. Opening cancels everything. Every reply wakes the window.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use plait_core::progress::Progress;
+use plait_core::surface::SurfacePoint;
+
+use crate::engine::{Engine, EngineError, ExportOptions, ExportReport, Opener, Proposal, Scene, Source, StripId};
+use crate::picker::Picker;
+
+/// Something to be done, in order.
+#[derive(Debug, Clone)]
+pub enum Job {
+    /// Open a model or a design in place of the present one.
+    Open(Source),
+    /// Place a proposal.
+    Place(Proposal),
+    /// Remove a strip.
+    Remove(StripId),
+    /// Show or hide a strip.
+    SetVisible(StripId, bool),
+    /// Take back.
+    Undo,
+    /// Make again.
+    Redo,
+    /// Find the strip that helps most and place it.
+    Suggest,
+    /// Write the design.
+    Save(PathBuf),
+    /// Write the finished layout into a folder.
+    Export(PathBuf, ExportOptions),
+}
+
+impl Job {
+    /// What is being done, for the progress bar.
+    pub fn label(&self) -> String {
+        match self {
+            Self::Open(source) => format!("Opening {}", source.name()),
+            Self::Place(_) => "Placing the strip".into(),
+            Self::Remove(_) => "Removing the strip".into(),
+            Self::SetVisible(..) => "Updating the view".into(),
+            Self::Undo => "Undoing".into(),
+            Self::Redo => "Redoing".into(),
+            Self::Suggest => "Looking for the strip that helps most".into(),
+            Self::Save(_) => "Saving the design".into(),
+            Self::Export(..) => "Exporting the layout".into(),
+        }
+    }
+}
+
+/// What comes back.
+#[derive(Debug)]
+pub enum Reply {
+    /// A model was opened.
+    Opened {
+        /// What was asked for.
+        source: Source,
+        /// Its first snapshot.
+        scene: Arc<Scene>,
+        /// Finds points of its design mesh.
+        picker: Arc<Picker>,
+    },
+    /// The design changed.
+    Changed(Arc<Scene>),
+    /// The design is the same, the scene says more of it.
+    Completed(Arc<Scene>),
+    /// The strips for a hover request.
+    Proposals {
+        /// Which request.
+        generation: u64,
+        /// Best first; of an answer that is not final, one that was found early.
+        proposals: Vec<Proposal>,
+        /// Whether this is all.
+        complete: bool,
+    },
+    /// The design was written.
+    Saved(PathBuf),
+    /// The layout was written.
+    Exported(PathBuf, ExportReport),
+    /// It could not be done.
+    Failed {
+        /// What.
+        label: String,
+        /// Why; never [`EngineError::Cancelled`] for a hover request.
+        error: EngineError,
+    },
+}
+
+/// What the worker is busy with.
+#[derive(Debug, Clone)]
+pub struct Running {
+    /// In words.
+    pub label: String,
+    /// Since when.
+    pub since: Instant,
+    /// How far; may be cancelled.
+    pub progress: Arc<Progress>,
+    /// Whether anything else goes before it: a hover request, or what was left for later.
+    pub yields: bool,
+}
+
+#[derive(Default)]
+struct State {
+    jobs: VecDeque<Job>,
+    hover: Option<(u64, SurfacePoint)>,
+    generation: u64,
+    /// Whether the engine may still have something to add to its scene.
+    incomplete: bool,
+    running: Option<Running>,
+    closed: bool,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    wake: Condvar,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The window's end of the worker.
+pub struct Worker {
+    shared: Arc<Shared>,
+    replies: Receiver<Reply>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+/// How long the window may be held up by a worker that does not notice the end of the program.
+const PATIENCE_AT_EXIT: Duration = Duration::from_millis(300);
+
+impl Worker {
+    /// Starts the thread. `notify` is called after every reply, from that thread.
+    ///
+    /// # Errors
+    ///
+    /// When the system gives no thread.
+    pub fn start(opener: Arc<dyn Opener>, notify: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared { state: Mutex::default(), wake: Condvar::new() });
+        let (sender, replies) = channel();
+        let inner = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("engine".into())
+            .stack_size(16 << 20) // deep recursions of searches on large meshes
+            .spawn(move || Loop { shared: inner, opener, engine: None, sender, notify: Box::new(notify) }.run())?;
+        Ok(Self { shared, replies, thread: Some(thread) })
+    }
+
+    /// Queues a job. It goes before any hover request; [`Job::Open`] drops all that was asked before.
+    pub fn request(&self, job: Job) {
+        let mut state = self.shared.lock();
+        let open = matches!(job, Job::Open(_));
+        state.hover = None;
+        if open {
+            state.jobs.clear();
+        }
+        if let Some(running) = state.running.as_ref().filter(|r| r.yields || open) {
+            running.progress.cancel();
+        }
+        state.jobs.push_back(job);
+        self.shared.wake.notify_one();
+    }
+
+    /// Asks for the strips through a point in place of any such request before; returns its generation.
+    pub fn hover(&self, at: SurfacePoint) -> u64 {
+        let mut state = self.shared.lock();
+        state.generation += 1;
+        state.hover = Some((state.generation, at));
+        cancel_yielding(&state);
+        self.shared.wake.notify_one();
+        state.generation
+    }
+
+    /// Drops the hover request.
+    pub fn forget_hover(&self) {
+        let mut state = self.shared.lock();
+        state.hover = None;
+        cancel_yielding(&state);
+    }
+
+    /// Cancels the job being done and all that wait.
+    pub fn cancel(&self) {
+        let mut state = self.shared.lock();
+        state.jobs.clear();
+        state.hover = None;
+        if let Some(running) = &state.running {
+            running.progress.cancel();
+        }
+    }
+
+    /// What is being done.
+    pub fn running(&self) -> Option<Running> {
+        self.shared.lock().running.clone()
+    }
+
+    /// Whether nothing is being done or waits.
+    pub fn is_idle(&self) -> bool {
+        let state = self.shared.lock();
+        state.running.is_none() && state.jobs.is_empty() && state.hover.is_none() && !state.incomplete
+    }
+
+    /// The next reply, if there is one.
+    pub fn reply(&self) -> Option<Reply> {
+        self.replies.try_recv().ok()
+    }
+}
+
+fn cancel_yielding(state: &State) {
+    if let Some(running) = state.running.as_ref().filter(|r| r.yields) {
+        running.progress.cancel();
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.shared.lock().closed = true;
+        self.cancel();
+        self.shared.wake.notify_one();
+        let Some(thread) = self.thread.take() else { return };
+        let start = Instant::now();
+        while !thread.is_finished() && start.elapsed() < PATIENCE_AT_EXIT {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+enum Task {
+    Job(Job),
+    Hover(u64, SurfacePoint),
+    /// Add to the scene what was left for later, while nothing else is asked.
+    Complete,
+}
+
+impl Task {
+    fn label(&self) -> String {
+        match self {
+            Self::Job(job) => job.label(),
+            Self::Hover(..) => "Looking for strips".into(),
+            Self::Complete => "Drawing the layout".into(),
+        }
+    }
+}
+
+/// The worker's end.
+struct Loop {
+    shared: Arc<Shared>,
+    opener: Arc<dyn Opener>,
+    engine: Option<Box<dyn Engine>>,
+    sender: Sender<Reply>,
+    notify: Box<dyn Fn() + Send>,
+}
+
+impl Loop {
+    fn run(mut self) {
+        while let Some((task, progress)) = self.next() {
+            let label = task.label();
+            let yields = !matches!(task, Task::Job(_));
+            let changes = !matches!(task, Task::Hover(..) | Task::Complete);
+            // A bug in the engine must cost one operation, not the user's session.
+            let result = catch_unwind(AssertUnwindSafe(|| self.work(task, &progress)))
+                .unwrap_or_else(|_| Err(EngineError::failed("an internal error; the design is as it was before")));
+            {
+                let mut state = self.shared.lock();
+                state.running = None;
+                state.incomplete |= changes;
+            }
+            match result {
+                Ok(replies) => replies.into_iter().for_each(|r| drop(self.sender.send(r))),
+                Err(EngineError::Cancelled) if yields => {}
+                Err(error) => drop(self.sender.send(Reply::Failed { label, error })),
+            }
+            (self.notify)();
+        }
+    }
+
+    /// Waits for the next task.
+    fn next(&self) -> Option<(Task, Arc<Progress>)> {
+        let mut state = self.shared.lock();
+        loop {
+            if state.closed {
+                return None;
+            }
+            let task = match state.jobs.pop_front() {
+                Some(job) => Some(Task::Job(job)),
+                None => state.hover.take().map(|(generation, at)| Task::Hover(generation, at)),
+            };
+            let task = task.or_else(|| std::mem::take(&mut state.incomplete).then_some(Task::Complete));
+            if let Some(task) = task {
+                let progress = Arc::new(Progress::new());
+                let (label, yields) = (task.label(), !matches!(task, Task::Job(_)));
+                state.running = Some(Running { label, since: Instant::now(), progress: Arc::clone(&progress), yields });
+                drop(state);
+                (self.notify)();
+                return Some((task, progress));
+            }
+            state = self.shared.wake.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn work(&mut self, task: Task, progress: &Progress) -> Result<Option<Reply>, EngineError> {
+        let job = match task {
+            Task::Job(Job::Open(source)) => return self.open(source, progress).map(Some),
+            Task::Job(job) => job,
+            Task::Hover(generation, at) => {
+                let Some(engine) = &mut self.engine else { return Ok(None) };
+                let mut first = |proposal| {
+                    let proposals = vec![proposal];
+                    drop(self.sender.send(Reply::Proposals { generation, proposals, complete: false }));
+                    (self.notify)();
+                };
+                let proposals = engine.proposals(at, &mut first, progress)?;
+                return Ok(Some(Reply::Proposals { generation, proposals, complete: true }));
+            }
+            Task::Complete => {
+                let Some(engine) = &mut self.engine else { return Ok(None) };
+                let completed = engine.complete(progress);
+                // What was cut short is taken up again after what went before it.
+                self.shared.lock().incomplete |= matches!(completed, Err(EngineError::Cancelled));
+                return Ok(completed?.then(|| Reply::Completed(engine.scene())));
+            }
+        };
+        let Some(engine) = &mut self.engine else { return Err(EngineError::failed("no model is open")) };
+        match job {
+            Job::Open(_) => return Ok(None),
+            Job::Place(proposal) => drop(engine.place(&proposal, progress)?),
+            Job::Remove(strip) => engine.remove(strip, progress)?,
+            Job::SetVisible(strip, visible) => engine.set_visible(strip, visible)?,
+            Job::Undo => engine.undo(progress)?,
+            Job::Redo => engine.redo(progress)?,
+            Job::Suggest => {
+                let proposal = engine.suggest(progress)?;
+                engine.place(&proposal, progress)?;
+            }
+            Job::Save(path) => {
+                engine.save(&path)?;
+                return Ok(Some(Reply::Saved(path)));
+            }
+            Job::Export(folder, options) => {
+                let report = engine.export(&folder, &options, progress)?;
+                return Ok(Some(Reply::Exported(folder, report)));
+            }
+        }
+        Ok(Some(Reply::Changed(engine.scene())))
+    }
+
+    fn open(&mut self, source: Source, progress: &Progress) -> Result<Reply, EngineError> {
+        let engine = self.opener.open(&source, progress)?;
+        let scene = engine.scene();
+        let picker = Arc::new(Picker::new(Arc::clone(&scene.design_mesh)));
+        self.engine = Some(engine);
+        Ok(Reply::Opened { source, scene, picker })
+    }
+}

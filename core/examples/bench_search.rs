@@ -7,7 +7,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use plait_core::elastica::{DirectionMask, ElasticaGraph, ElasticaOptions, ProposalQuery, SearchWorkspace};
+use plait_core::elastica::{
+    Anchor, AnchorQuery, DirectionMask, ElasticaGraph, ElasticaOptions, ProposalQuery, SearchWorkspace,
+};
 use plait_core::mesh::{TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::surface::principal_curvature;
@@ -117,17 +119,41 @@ fn main() {
     println!("settled, % of states  {}", summary(states));
     println!("first / cheapest cost {}", summary(ratio));
     println!("cheapest cost         {}", summary(cost));
-    let (mut all, mut routes, mut unproved) = (Vec::new(), Vec::new(), 0);
+    let (mut all, mut routes, mut all_states, mut unproved) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for &v in vertices.iter().take(60) {
         let start = Instant::now();
         let query = ProposalQuery::alternatives(v, &mask);
         let found = graph.proposals(&query, &mut work, &progress).expect("not cancelled");
         all.push(ms(start));
         routes.push(found.loops.len() as f64);
+        all_states.push(100.0 * found.settled as f64 / graph.n_states() as f64);
         unproved += usize::from(!found.proved);
     }
     println!("alternatives, ms      {}   ({unproved} unproved)", summary(all));
     println!("alternatives, count   {}", summary(routes));
+    println!("settled, % of states  {}", summary(all_states));
+    let anchor = |i: usize, turned: bool| {
+        let vertex = vertices[i % count];
+        let direction = turned.then(|| DVec3::new(i as f64, 7.0, -3.0 * i as f64).cross(mesh.position(vertex)));
+        Anchor { vertex, direction }
+    };
+    for (name, per_loop, turned) in [("two free anchors, ms ", 2, false), ("three directions, ms  ", 3, true)] {
+        let mut times = Vec::new();
+        for i in 0..10 {
+            let anchors: Vec<Anchor> = (0..per_loop).map(|k| anchor(per_loop * i + k, turned)).collect();
+            let start = Instant::now();
+            let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: 20_000_000 };
+            graph.loop_through(&query, &mut work, &progress).expect("not cancelled");
+            times.push(ms(start));
+        }
+        println!("{name}{}", summary(times));
+    }
+    let start = Instant::now();
+    let mut closed = DirectionMask::none();
+    for f in mesh.faces() {
+        graph.disable_near(&mut closed, f, mesh.vector(mesh.face_halfedges(f)[0]), std::f64::consts::FRAC_PI_4);
+    }
+    println!("closing directions in all faces, ms {:9.2}", ms(start));
     println!("plain Dijkstra, ms    {:9.2}", {
         let start = Instant::now();
         std::hint::black_box(graph.farthest(vertices[0]));

@@ -11,6 +11,7 @@ pub mod mesh;
 pub mod progress;
 pub mod quad;
 pub mod solve;
+pub mod strip;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -1,4 +1,6 @@
-//! Curves from boundary to boundary through a vertex (7.4: one node for all boundaries).
+//! Curves from boundary to boundary through a vertex.
+//!
+//! As in Campen, chapter 8, all boundaries are one node of the graph.
 //!
 //! One field of distances from the boundary serves every vertex: reversed, it holds the cheapest way from each state
 //! to the boundary. It is computed once for each set of closed directions.
@@ -14,7 +16,7 @@ use crate::progress::{Cancelled, Progress};
 pub(super) struct BoundaryField {
     mask: DirectionMask,
     n_states: usize,
-    field: Field,
+    pub(super) field: Field,
 }
 
 impl SearchWorkspace {
@@ -71,7 +73,7 @@ impl BoundaryField {
     }
 
     /// Cheapest way from the middle of `a` to the boundary.
-    fn home(&self, graph: &ElasticaGraph, a: State) -> f32 {
+    pub(super) fn home(&self, graph: &ElasticaGraph, a: State) -> f32 {
         self.field.dist(graph.reverse[a as usize])
     }
 

@@ -37,17 +37,17 @@ impl LoopSearch<'_> {
     /// The cheapest loop that starts with state `a`, if there is one cheaper than `limit`.
     pub(super) fn both_ways(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
-        let (root, star) = (&mut self.work.root, &mut self.work.star);
+        let (root, far) = (&mut self.work.root, &mut self.work.far);
         let sources = [a, graph.reverse[a as usize]];
-        for (field, source) in [&mut *root, &mut *star].into_iter().zip(sources) {
+        for (field, source) in [&mut *root, &mut *far].into_iter().zip(sources) {
             field.restart(graph.n_states());
             field.set(source, 0.0, NO_STATE, 0);
             field.push(0.0, source);
         }
         let (mut cost, mut meet) = (limit, None);
-        while root.top() + star.top() < cost {
-            let forwards = root.top() <= star.top();
-            let (near, far) = if forwards { (&mut *root, &*star) } else { (&mut *star, &*root) };
+        while root.top() + far.top() < cost {
+            let forwards = root.top() <= far.top();
+            let (near, other) = if forwards { (&mut *root, &*far) } else { (&mut *far, &*root) };
             let Some((d, e)) = near.pop() else { break };
             if !near.settle(d, e) {
                 continue;
@@ -56,7 +56,7 @@ impl LoopSearch<'_> {
             for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
                 let reached = d + graph.step(e, f);
                 let back = graph.reverse[f as usize];
-                let total = reached + far.dist(back);
+                let total = reached + other.dist(back);
                 if total < cost {
                     (cost, meet) = (total, Some(if forwards { (e, back) } else { (back, e) }));
                 }
@@ -68,7 +68,7 @@ impl LoopSearch<'_> {
         }
         let Some((e, back)) = meet else { return Ok(None) };
         let mut states = root.chain(e);
-        states.extend(star.chain(back).iter().rev().map(|&s| graph.reverse[s as usize]));
+        states.extend(far.chain(back).iter().rev().map(|&s| graph.reverse[s as usize]));
         // Both chains hold the start.
         states.pop();
         Ok(Some(Route { cost, states, closed: true }))

@@ -10,15 +10,17 @@
 //! it, as it lets one distance field serve both ways.
 
 use std::f32::consts::PI;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::unfold::{Corners, EdgeCrossing, Geodesic, Unfolding, direction_in_face};
-use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
+use super::geodesics::{Pair, geodesics};
+use super::unfold::{Corners, direction_in_face};
+use super::weights::Weights;
+use crate::mesh::{TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::PrincipalCurvature;
 
@@ -27,24 +29,6 @@ pub(super) type State = u32;
 
 /// "No state".
 pub(super) const NO_STATE: State = u32::MAX;
-
-/// Most geodesics kept per vertex besides its own edges; the shortest ones. A regular 4-ring has about 60, a
-/// 5-ring 90, irregular ones up to twice that; the rest are hubs of slivers, where thousands would lie nearly
-/// in one place.
-const MAX_GEODESICS: usize = 250;
-
-/// Largest ring looked at from one vertex, for the same reason.
-const MAX_RING: usize = 1000;
-
-/// Largest alignment cost of one geodesic, so that degenerate triangles cannot overflow the sums. Ordinary surfaces
-/// of diagonal 1 stay below 2000.
-const MAX_ALIGNMENT: f64 = 1e6;
-
-/// Shortest length a geodesic counts with, so that the turning cost stays finite.
-const MIN_LENGTH: f64 = 1e-9;
-
-/// Vertices per parallel piece of work.
-const CHUNK: usize = 256;
 
 /// Weights and size of the graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,17 +115,6 @@ pub struct ElasticaGraph {
     /// Middle of each geodesic, by face: first entry of each face, then state and angle in the face.
     pub(super) middle_first: Vec<u32>,
     pub(super) middle: Vec<(State, f32)>,
-}
-
-/// A geodesic between two vertices, before it has a place in the graph.
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    ends: [u32; 2],
-    angles: [f32; 2],
-    length: f32,
-    alignment: f32,
-    middle_face: u32,
-    middle_angle: f32,
 }
 
 impl ElasticaGraph {
@@ -369,225 +342,4 @@ fn by_middle(n_faces: usize, pairs: &[Pair], place: &[u32]) -> (Vec<u32>, Vec<(S
         *slot += 1;
     }
     (first, middle)
-}
-
-/// Alignment cost of directions (7.3 of the thesis summary: deviation times anisotropy, features apart).
-struct Weights<'a> {
-    mesh: &'a TriMesh,
-    curvature: &'a [PrincipalCurvature],
-    /// Per edge: whether curves should cross it at a right angle.
-    crease: Vec<bool>,
-    /// Per vertex: whether a crease ends or passes there.
-    on_crease: Vec<bool>,
-    options: &'a ElasticaOptions,
-}
-
-impl<'a> Weights<'a> {
-    fn new(
-        mesh: &'a TriMesh,
-        curvature: &'a [PrincipalCurvature],
-        sharp: &[bool],
-        options: &'a ElasticaOptions,
-    ) -> Self {
-        let is_crease = |e: EdgeId| sharp[e.index()] || (options.aligned_boundary && mesh.is_boundary_edge(e));
-        let crease: Vec<bool> = mesh.edges().map(is_crease).collect();
-        let mut on_crease = vec![false; mesh.n_vertices()];
-        for e in mesh.edges().filter(|e| crease[e.index()]) {
-            for v in mesh.edge_vertices(e) {
-                on_crease[v.index()] = true;
-            }
-        }
-        Self { mesh, curvature, crease, on_crease, options }
-    }
-
-    /// Alignment cost of leaving `v` in the unit direction `t`.
-    fn at_vertex(&self, v: VertexId, t: DVec3) -> f64 {
-        if self.on_crease[v.index()] {
-            let along = self.crease_directions(v).map(|s| s.dot(t)).fold(0.0, f64::max);
-            return self.feature((1.0 - along * along).max(0.0).sqrt());
-        }
-        let c = &self.curvature[v.index()];
-        let (x, y) = (t.dot(c.d_min), t.dot(c.d_max));
-        let longer = x.abs().max(y.abs());
-        let deviation = if longer > 0.0 { x.hypot(y) / longer - 1.0 } else { 0.0 };
-        deviation * (c.k_min.abs() - c.k_max.abs()).powi(2)
-    }
-
-    /// Cost of meeting a crease at an angle of the given sine.
-    fn feature(&self, sine: f64) -> f64 {
-        let cap = self.options.feature_cap;
-        let deviation = if sine * (1.0 + cap) > 1.0 { 1.0 / sine - 1.0 } else { cap };
-        self.options.feature_weight * deviation
-    }
-
-    /// Unit vectors from `v` along its creases.
-    fn crease_directions(&self, v: VertexId) -> impl Iterator<Item = DVec3> + '_ {
-        let mesh = self.mesh;
-        let last = mesh.outgoing(v).map(move |h| mesh.prev(h)).find(move |&h| mesh.twin(h).is_none());
-        let spokes = mesh.outgoing(v).map(move |h| (h, mesh.vector(h)));
-        spokes
-            .chain(last.map(|h| (h, -mesh.vector(h))))
-            .filter(|(h, _)| self.crease[mesh.edge(*h).index()])
-            .map(|(_, vector)| vector.normalize_or_zero())
-    }
-
-    /// Alignment cost of a geodesic: the mean of its ends, and what the creases it crosses on its way add.
-    fn of_geodesic(&self, v: VertexId, g: &Geodesic, crossings: &[EdgeCrossing]) -> f64 {
-        let departure = direction_in_face(self.mesh, g.start, g.start_angle);
-        let arrival = direction_in_face(self.mesh, g.end, g.end_angle);
-        let ends = 0.5 * (self.at_vertex(v, departure) + self.at_vertex(g.target, arrival));
-        let crossed = crossings
-            .iter()
-            .filter(|c| self.crease[self.mesh.edge(c.halfedge).index()])
-            .map(|c| self.feature(c.angle.sin().abs()))
-            .fold(0.0, f64::max);
-        (ends + crossed).min(MAX_ALIGNMENT)
-    }
-}
-
-/// The rings around a vertex, with marks that are reused.
-struct Rings {
-    mark: Vec<u32>,
-    members: Vec<VertexId>,
-}
-
-impl Rings {
-    /// Marks the vertices within `rings` edges of `v`.
-    fn gather(&mut self, mesh: &TriMesh, v: VertexId, rings: usize) {
-        self.members.clear();
-        self.members.push(v);
-        self.mark[v.index()] = v.0;
-        let mut done = 0;
-        for _ in 0..rings {
-            let end = self.members.len();
-            for i in done..end {
-                for h in mesh.outgoing(self.members[i]) {
-                    for w in [mesh.target(h), mesh.opposite(h)] {
-                        if self.mark[w.index()] != v.0 && self.members.len() < MAX_RING {
-                            self.mark[w.index()] = v.0;
-                            self.members.push(w);
-                        }
-                    }
-                }
-            }
-            done = end;
-        }
-    }
-}
-
-/// All geodesics of the graph, each once, from its smaller to its larger vertex.
-fn geodesics(
-    mesh: &TriMesh,
-    corners: &Corners,
-    weights: &Weights,
-    rings: usize,
-    progress: &Progress,
-) -> Result<Vec<Pair>, Cancelled> {
-    let n = mesh.n_vertices();
-    let chunks: Vec<(Vec<Pair>, Vec<f32>)> = (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|c| {
-            progress.check()?;
-            let mut ring = Rings { mark: vec![u32::MAX; n], members: Vec::new() };
-            let mut work = Unfolding::default();
-            let (mut pairs, mut limits) = (Vec::new(), Vec::new());
-            for v in (c * CHUNK..((c + 1) * CHUNK).min(n)).map(VertexId::new) {
-                ring.gather(mesh, v, rings);
-                limits.push(from_vertex(mesh, corners, weights, v, &ring, &mut work, &mut pairs));
-            }
-            Ok((pairs, limits))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    let limits: Vec<f32> = chunks.iter().flat_map(|c| &c.1).copied().collect();
-    let kept = |p: &Pair| p.ends.iter().all(|&v| p.length <= limits[v as usize]) || is_edge(mesh, p);
-    Ok(chunks.iter().flat_map(|c| &c.0).copied().filter(kept).collect())
-}
-
-fn is_edge(mesh: &TriMesh, p: &Pair) -> bool {
-    edge_between(mesh, VertexId(p.ends[0]), VertexId(p.ends[1])).is_some()
-}
-
-/// A half-edge along the edge between two vertices: from `v` to `w`, or back if only that exists.
-pub(super) fn edge_between(mesh: &TriMesh, v: VertexId, w: VertexId) -> Option<HalfedgeId> {
-    mesh.outgoing(v).find_map(|h| {
-        let back = mesh.prev(h);
-        if mesh.target(h) == w {
-            Some(h)
-        } else {
-            (mesh.origin(back) == w && mesh.twin(back).is_none()).then_some(back)
-        }
-    })
-}
-
-/// Appends the geodesics from `v` to larger vertices; returns the length beyond which `v` wants none.
-fn from_vertex(
-    mesh: &TriMesh,
-    corners: &Corners,
-    weights: &Weights,
-    v: VertexId,
-    ring: &Rings,
-    work: &mut Unfolding,
-    pairs: &mut Vec<Pair>,
-) -> f32 {
-    let mut found: Vec<Geodesic> = Vec::new();
-    work.all(
-        mesh,
-        v,
-        |w| ring.mark[w.index()] == v.0,
-        |g| {
-            if g.target != v {
-                found.push(g);
-            }
-        },
-    );
-    // Mesh edges are visited first and stay; of the others the shortest to each vertex stays.
-    found.sort_by(|a, b| {
-        let key = |g: &Geodesic| (g.target, !g.is_edge());
-        key(a).cmp(&key(b)).then(a.length.total_cmp(&b.length))
-    });
-    found.dedup_by_key(|g| g.target);
-    let limit = if found.len() > MAX_GEODESICS {
-        let mut lengths: Vec<f64> = found.iter().map(|g| g.length).collect();
-        *lengths.select_nth_unstable_by(MAX_GEODESICS, f64::total_cmp).1 as f32
-    } else {
-        f32::INFINITY
-    };
-    for g in found.iter().filter(|g| g.target > v) {
-        let crossings = work.crossings(g);
-        let (middle_face, middle_angle) = middle(mesh, g, &crossings);
-        let angle = |h: HalfedgeId, local: f64| {
-            let tangent = corners.tangent(mesh, h, local);
-            // An inner fan closes at 2π, where its first spoke is again.
-            if tangent >= TAU && !mesh.is_boundary_vertex(mesh.origin(h)) { tangent - TAU } else { tangent }
-        };
-        pairs.push(Pair {
-            ends: [v.0, g.target.0],
-            angles: [angle(g.start, g.start_angle) as f32, angle(g.end, g.end_angle) as f32],
-            length: g.length.max(MIN_LENGTH) as f32,
-            alignment: weights.of_geodesic(v, g, &crossings) as f32,
-            middle_face: middle_face.0,
-            middle_angle: middle_angle as f32,
-        });
-    }
-    limit
-}
-
-/// The triangle that holds the middle of a geodesic, and the angle of its direction there from side 0.
-fn middle(mesh: &TriMesh, g: &Geodesic, crossings: &[EdgeCrossing]) -> (FaceId, f64) {
-    let half = 0.5 * g.length;
-    let (h, angle) = match crossings.iter().find(|c| c.distance >= half) {
-        Some(c) => (c.halfedge, c.angle),
-        None => (g.end, g.end_angle + std::f64::consts::PI),
-    };
-    (mesh.face(h), side_angle(mesh, h) + angle)
-}
-
-/// Angle from side 0 of its triangle to a half-edge, counter-clockwise.
-fn side_angle(mesh: &TriMesh, h: HalfedgeId) -> f64 {
-    let [first, second, _] = mesh.face_halfedges(mesh.face(h));
-    match h.0 % 3 {
-        0 => 0.0,
-        1 => std::f64::consts::PI - mesh.corner_angle(second),
-        _ => std::f64::consts::PI + mesh.corner_angle(first),
-    }
 }

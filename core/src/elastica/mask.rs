@@ -1,5 +1,7 @@
 //! Directions closed to the search, because a strip already runs there.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::graph::{ElasticaGraph, State};
@@ -45,19 +47,17 @@ impl DirectionMask {
 
 impl ElasticaGraph {
     /// Closes the geodesics that start, end or have their middle in `face` and run within `max_angle` radians of
-    /// `direction` (either way) there. At a strip the source takes 45° (section 8.5).
+    /// `direction` (either way) there. Along a strip 45° closes what is
+    /// equivalent to it and leaves what crosses it.
     pub fn disable_near(&self, mask: &mut DirectionMask, face: FaceId, direction: DVec3, max_angle: f64) {
         let mesh = &self.mesh;
         for h in mesh.face_halfedges(face) {
             let wanted = angle_from(mesh.vector(h), direction, mesh.face_normal(face));
-            let (low, high) = (self.corners.spoke(mesh, h), self.corners.tangent(mesh, h, mesh.corner_angle(h)));
-            for e in self.leaving(mesh.origin(h)) {
-                let out = self.out_angle(e);
-                if out < low || out > high {
-                    continue;
-                }
-                let (_, local) = self.corners.locate(mesh, mesh.origin(h), out);
-                if unoriented(local - wanted) <= max_angle {
+            let (low, high) = (self.corners.tangent(mesh, h, 0.0), self.corners.tangent(mesh, h, mesh.corner_angle(h)));
+            let states = self.leaving(mesh.origin(h));
+            let begin = self.first_from(&states, low);
+            for e in (begin..states.end).take_while(|&e| self.out_angle(e) <= high) {
+                if unoriented(self.corners.local(mesh, h, self.out_angle(e)) - wanted) <= max_angle {
                     mask.close(self, e);
                 }
             }
@@ -70,6 +70,18 @@ impl ElasticaGraph {
                 mask.close(self, e);
             }
         }
+    }
+}
+
+impl ElasticaGraph {
+    /// The first of the `states` around a vertex at a tangent angle of at least `angle`.
+    fn first_from(&self, states: &Range<State>, angle: f64) -> State {
+        let (mut low, mut high) = (states.start, states.end);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.out_angle(middle) < angle { low = middle + 1 } else { high = middle }
+        }
+        low
     }
 }
 

@@ -5,17 +5,22 @@
 //! direction and turning has a price. This room may use the mesh and the surface, and knows neither strips nor
 //! the user.
 
+mod anchors;
 mod boundary;
 mod direction;
+mod geodesics;
 mod graph;
 mod mask;
 mod proposals;
 mod search;
+mod stars;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod unfold;
+mod weights;
 
+pub use anchors::{Anchor, AnchorQuery};
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
 pub use mask::DirectionMask;
 pub use proposals::{FoundLoop, ProposalQuery, Proposals};

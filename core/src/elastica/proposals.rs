@@ -176,7 +176,7 @@ impl ElasticaGraph {
         sum
     }
 
-    fn found(&self, route: &Route) -> Option<FoundLoop> {
+    pub(super) fn found(&self, route: &Route) -> Option<FoundLoop> {
         let curve = self.curve(route)?;
         let [length, alignment, bending] = self.parts(route);
         let mut path: Vec<VertexId> = route.states.iter().map(|&e| self.origin(e)).collect();
@@ -190,9 +190,7 @@ impl ElasticaGraph {
 impl LoopSearch<'_> {
     /// The cheapest loop along the state nearest to `direction`.
     fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
-        let nearness = |a: &State| self.graph.departure(*a).dot(direction);
-        let out = self.graph.leaving(self.vertex).filter(|&a| self.mask.is_open(a));
-        let Some(a) = out.max_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(b.cmp(a))) else { return Ok(()) };
+        let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
         let open = self.work.boundary.as_ref().and_then(|b| b.through(self.graph, self.vertex, a));
         let limit = open.as_ref().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);
@@ -216,18 +214,23 @@ impl LoopSearch<'_> {
         }
         ball?;
         let mut cost = best.map_or(f32::INFINITY, |r| r.cost);
-        let slack = if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 };
-        self.corridor(cost * slack)?;
-        for (bound, a) in self.directions(cost * slack) {
-            if bound >= cost * slack {
-                break;
-            }
-            if let Some(route) = self.star(a, cost * slack)? {
-                cost = cost.min(route.cost);
-                routes.push(route);
-            }
+        self.corridor(cost * self.slack())?;
+        let directions = self.directions(cost * self.slack());
+        let known = routes.len();
+        self.improve(&directions, &mut cost, routes)?;
+        if self.factor > 1.0 {
+            let limit = cost * self.slack();
+            // What was found on the way is the cheapest of its direction; the routes before need not be.
+            let solved = |a: State| routes[known..].iter().any(|r| r.states[0] == a);
+            let rest = directions.iter().filter(|&&(bound, a)| bound < limit && !solved(a)).map(|d| d.1).collect();
+            self.alternatives(rest, limit, routes)?;
         }
         Ok(())
+    }
+
+    /// The factor, with room for rounding where costs up to it are wanted.
+    fn slack(&self) -> f32 {
+        if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
     }
 }
 

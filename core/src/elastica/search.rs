@@ -7,17 +7,19 @@
 //! 2. *Corridor*: beyond that radius only states are continued from which the way back is known and the whole
 //!    stays below the bound. Now `D(rev e)` is the exact cheapest way from `e` back to `v`, in any direction, for
 //!    each state that can lie on a loop below the bound.
-//! 3. *Star*: for each start direction that can still matter an A* search with that potential finds the cheapest
-//!    loop in that direction, up to the bound.
+//! 3. *Stars* ([`super::stars`]): for each start direction that can still matter an A* search with that potential
+//!    finds the cheapest loop in that direction, up to the bound.
 //!
 //! Reversal symmetry of the prices carries 1 and 2: one field from `v` serves both ways.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Mutex;
 
 use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
+use super::stars::Fan;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
@@ -34,7 +36,7 @@ struct Label {
     /// The search this label belongs to; labels of earlier searches do not exist.
     stamp: u32,
     parent: State,
-    /// Index among the states leaving the source.
+    /// Index among the states leaving the source; with several legs, the leg of the parent.
     origin: u16,
     settled: bool,
 }
@@ -74,7 +76,7 @@ impl Field {
 
     /// Final distance, infinite where none is known.
     #[inline]
-    fn settled(&self, e: State) -> f32 {
+    pub(super) fn settled(&self, e: State) -> f32 {
         self.get(e).filter(|l| l.settled).map_or(f32::INFINITY, |l| l.dist)
     }
 
@@ -110,7 +112,7 @@ impl Field {
 
     /// The next state that was not expanded since it was last set, marked as expanded.
     #[inline]
-    fn pop_fresh(&mut self) -> Option<(f32, State)> {
+    pub(super) fn pop_fresh(&mut self) -> Option<(f32, State)> {
         loop {
             let (key, e) = self.pop()?;
             let label = &mut self.labels[e as usize];
@@ -119,6 +121,12 @@ impl Field {
                 return Some((key, e));
             }
         }
+    }
+
+    /// The state before `e`, and the tag it was set with.
+    pub(super) fn parent(&self, e: State) -> (State, u16) {
+        let label = &self.labels[e as usize];
+        (label.parent, label.origin)
     }
 
     /// The states from the source to `e`.
@@ -135,8 +143,14 @@ impl Field {
 #[derive(Debug, Default)]
 pub struct SearchWorkspace {
     pub(super) root: Field,
-    pub(super) star: Field,
+    /// The second front of a search from both ends.
+    pub(super) far: Field,
+    /// Per thread, for start directions that are searched at once.
+    pub(super) fans: Vec<Mutex<Fan>>,
     meets: Vec<(State, State)>,
+    /// Per leg of a loop through anchors.
+    pub(super) home: Vec<Field>,
+    pub(super) ahead: Vec<Field>,
     pub(super) boundary: Option<BoundaryField>,
 }
 
@@ -323,44 +337,5 @@ impl LoopSearch<'_> {
             .collect();
         list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         list
-    }
-
-    /// Step 3: the cheapest loop that starts with state `a`, if there is one cheaper than `limit`.
-    pub(super) fn star(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
-        let graph = self.graph;
-        let (root, star) = (&self.work.root, &mut self.work.star);
-        star.restart(graph.n_states());
-        let (mut cost, mut last) = (limit, NO_STATE);
-        let (mut from, mut d, mut parent) = (a, 0.0, NO_STATE);
-        loop {
-            for f in graph.successors(from).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(from, f);
-                if reached >= star.dist(f) {
-                    continue;
-                }
-                let key = reached + root.settled(graph.reverse[f as usize]);
-                if key >= cost {
-                    continue;
-                }
-                // The potential is exact up to rounding only, so a state may be reached again, a bit cheaper.
-                star.set(f, reached, parent, 0);
-                star.push(key, f);
-                if graph.follows(f, a) {
-                    let closed = reached + graph.step(f, a);
-                    if closed < cost {
-                        (cost, last) = (closed, f);
-                    }
-                }
-            }
-            let Some((_, e)) = star.pop_fresh().filter(|&(key, _)| key < cost) else { break };
-            self.meter.tick()?;
-            (from, d, parent) = (e, star.dist(e), e);
-        }
-        if last == NO_STATE {
-            return Ok(None);
-        }
-        let mut states = vec![a];
-        states.extend(star.chain(last));
-        Ok(Some(Route { cost, states, closed: true }))
     }
 }

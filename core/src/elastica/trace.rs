@@ -5,7 +5,8 @@
 //! boundary is in the way, the right side is taken. Turning back at once over the edge just crossed is removed, so
 //! that what remains crosses each edge for a reason.
 
-use super::graph::{ElasticaGraph, State, edge_between};
+use super::geodesics::edge_between;
+use super::graph::{ElasticaGraph, State};
 use super::search::Route;
 use super::unfold::Unfolding;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};

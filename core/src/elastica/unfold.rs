@@ -52,9 +52,9 @@ impl Corners {
         Self { start, total, scale }
     }
 
-    /// Angle of the spoke `h` in the tangent plane of its origin.
-    pub(crate) fn spoke(&self, mesh: &TriMesh, h: HalfedgeId) -> f64 {
-        self.start[h.index()] * self.scale[mesh.origin(h).index()]
+    /// The inverse of [`Self::tangent`].
+    pub(crate) fn local(&self, mesh: &TriMesh, h: HalfedgeId, tangent: f64) -> f64 {
+        tangent / self.scale[mesh.origin(h).index()] - self.start[h.index()]
     }
 
     /// Tangent angle of the direction `local` radians counter-clockwise of spoke `h`.

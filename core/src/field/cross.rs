@@ -44,10 +44,11 @@ impl CrossField {
         metric.tangent(mesh, f, self.angle[f.index()] + f64::from(branch) * FRAC_PI_2)
     }
 
-    /// The branch of the cross in the triangle of `h` that is nearest to `h`, 0 to 3.
+    /// The branch (0 to 3) of the cross in the triangle of `h` that is nearest to the direction `lean`
+    /// counter-clockwise of `h`.
     #[inline]
-    pub fn branch_along(&self, metric: &Metric, h: HalfedgeId) -> i32 {
-        jumps::branch_along(metric, &self.angle, h)
+    pub fn branch_along(&self, metric: &Metric, h: HalfedgeId, lean: f64) -> i32 {
+        jumps::branch_along(metric, &self.angle, h, lean)
     }
 }
 
@@ -67,9 +68,9 @@ pub fn interpolate(
     if !aligned.is_empty() {
         expect_length("the list of aligned edges", aligned.len(), mesh.n_edges())?;
     }
-    let on_path = paths.iter().flat_map(|p| p.steps.iter().map(|s| s.edge));
+    let on_path = paths.iter().flat_map(|p| p.steps.iter().map(|s| s.edge).zip(p.lean.iter().copied()));
     let marked = mesh.edges().filter(|e| aligned.get(e.index()).copied().unwrap_or(false));
-    let hard = along_edges(mesh, metric, on_path.chain(marked));
+    let hard = along_edges(mesh, metric, on_path.chain(marked.map(|e| (e, 0.0))));
     let vectors = interpolate_vectors(mesh, metric, &hard, &Pull::default(), progress)?;
     let angle: Vec<f64> = vectors.iter().map(|z| z.arg() / 4.0).collect();
     let mut jump = jumps::principal(mesh, metric, &angle);
@@ -78,13 +79,18 @@ pub fn interpolate(
     Ok(CrossField { angle, jump, singularities })
 }
 
-/// The representation vectors of the triangles at `edges`: the direction of the edge, or the average of several.
-pub(super) fn along_edges(mesh: &TriMesh, metric: &Metric, edges: impl Iterator<Item = EdgeId>) -> Vec<Option<c64>> {
+/// The representation vectors of the triangles at `edges`: the direction of the edge, turned by the angle given with
+/// it, or the average of several.
+pub(super) fn along_edges(
+    mesh: &TriMesh,
+    metric: &Metric,
+    edges: impl Iterator<Item = (EdgeId, f64)>,
+) -> Vec<Option<c64>> {
     let mut sum: Vec<Option<c64>> = vec![None; mesh.n_faces()];
-    for e in edges {
+    for (e, lean) in edges {
         let h = mesh.halfedge(e);
         for h in [Some(h), mesh.twin(h)].into_iter().flatten() {
-            let z = c64::from_polar(1.0, 4.0 * metric.direction(h));
+            let z = c64::from_polar(1.0, 4.0 * (metric.direction(h) + lean));
             let slot = &mut sum[mesh.face(h).index()];
             // Two edges that differ by just an eighth of a turn cancel: then the first one stands.
             *slot = match *slot {

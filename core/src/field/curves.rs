@@ -2,9 +2,19 @@
 //!
 //! Where a curve crosses itself four of its edges meet in one vertex; opposite ones belong together, because
 //! crossings are transversal. Curves may end at the boundary only.
+//!
+//! Such a path zigzags on the scale of the triangles, and fields must not follow that. Its direction is therefore
+//! averaged: the turns at its vertices, measured by the angles on both sides, unroll it into a staircase of angles
+//! over arc length, whose mean over a window says by how much each edge leans away from the curve it stands for.
 
+use std::f64::consts::PI;
+
+use super::metric::Metric;
 use super::{FieldError, expect_length};
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh, VertexId};
+
+/// Half the window over which directions are averaged, in mean edge lengths.
+const WINDOW: f64 = 2.0;
 
 /// An edge passed in one direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,12 +54,14 @@ impl Step {
 }
 
 /// A curve along edges.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EdgePath {
     /// The curve it is, or is a part of.
     pub curve: u32,
     /// Consecutive edges.
     pub steps: Vec<Step>,
+    /// Angle from each edge to the smoothed tangent of the curve, counter-clockwise, in radians.
+    pub lean: Vec<f64>,
     /// Whether the last step leads to the start of the first; otherwise both ends lie on the boundary.
     pub closed: bool,
 }
@@ -75,12 +87,17 @@ fn spokes(mesh: &TriMesh, v: VertexId) -> Vec<Step> {
 /// # Errors
 ///
 /// [`FieldError::WrongLength`], or [`FieldError::OpenCurve`] where a curve ends inside the surface.
-pub fn trace_curves(mesh: &TriMesh, curve_of_edge: &[Option<u32>]) -> Result<Vec<EdgePath>, FieldError> {
+pub fn trace_curves(
+    mesh: &TriMesh,
+    metric: &Metric,
+    curve_of_edge: &[Option<u32>],
+) -> Result<Vec<EdgePath>, FieldError> {
     expect_length("the list of curves per edge", curve_of_edge.len(), mesh.n_edges())?;
     let mut used = vec![false; mesh.n_edges()];
     let mut edges: Vec<(u32, EdgeId)> = mesh.edges().filter_map(|e| Some((curve_of_edge[e.index()]?, e))).collect();
     edges.sort();
     let mut paths = Vec::new();
+    let window = WINDOW * mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
     for &(curve, e) in &edges {
         if used[e.index()] {
             continue;
@@ -96,9 +113,90 @@ pub fn trace_curves(mesh: &TriMesh, curve_of_edge: &[Option<u32>]) -> Result<Vec
         for s in &steps {
             used[s.edge.index()] = true;
         }
-        paths.push(EdgePath { curve, steps, closed });
+        let lean = lean(mesh, metric, &steps, closed, window);
+        paths.push(EdgePath { curve, steps, lean, closed });
     }
     Ok(paths)
+}
+
+impl EdgePath {
+    /// Consecutive steps, as positions in [`Self::steps`].
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let n = self.steps.len();
+        (usize::from(!self.closed)..n).map(move |i| ((i + n - 1) % n, i))
+    }
+}
+
+/// The half-edges crossed counter-clockwise around the vertex between two steps, from the triangle left of the
+/// second to the triangle left of the first; `None` if the boundary is in between.
+pub(super) fn left_fan(mesh: &TriMesh, a: Step, b: Step) -> Option<Vec<HalfedgeId>> {
+    let end = a.left(mesh)?;
+    let mut h = b.left(mesh)?;
+    let mut fan = Vec::new();
+    loop {
+        let spoke = mesh.prev(h);
+        if spoke == end {
+            return Some(fan);
+        }
+        fan.push(spoke);
+        h = mesh.twin(spoke)?;
+    }
+}
+
+/// How much a path turns to the left between two steps: half the difference of the angles on its sides.
+fn turn(mesh: &TriMesh, metric: &Metric, a: Step, b: Step) -> f64 {
+    let angle = |a: Step, b: Step| {
+        let fan = left_fan(mesh, a, b)?;
+        let first = metric.corner_angle(b.left(mesh)?);
+        Some(fan.iter().filter_map(|&h| mesh.twin(h)).map(|h| metric.corner_angle(h)).sum::<f64>() + first)
+    };
+    match (angle(a, b), angle(b.reversed(), a.reversed())) {
+        (Some(left), Some(right)) => 0.5 * (right - left),
+        (Some(left), None) => PI - left,
+        (None, Some(right)) => right - PI,
+        (None, None) => 0.0,
+    }
+}
+
+/// For each step the angle to the mean direction of the path over `window` before and behind its middle.
+fn lean(mesh: &TriMesh, metric: &Metric, steps: &[Step], closed: bool, window: f64) -> Vec<f64> {
+    let n = steps.len();
+    let length: Vec<f64> = steps.iter().map(|s| mesh.edge_length(s.edge)).collect();
+    let turns: Vec<f64> = (0..n)
+        .map(|i| if i == 0 && !closed { 0.0 } else { turn(mesh, metric, steps[(i + n - 1) % n], steps[i]) })
+        .collect();
+    // A window that is longer than the path would count parts of it twice.
+    let window = window.min(0.25 * length.iter().sum::<f64>());
+    (0..n)
+        .map(|i| {
+            let mut weight = length[i];
+            let mut moment = 0.0;
+            for forward in [true, false] {
+                let (mut k, mut angle, mut reach) = (i, 0.0, window - 0.5 * length[i]);
+                while reach > 0.0 {
+                    let end = if forward { k + 1 == n } else { k == 0 };
+                    if end && !closed {
+                        break;
+                    }
+                    if forward {
+                        k = (k + 1) % n;
+                        angle += turns[k];
+                    } else {
+                        angle -= turns[k];
+                        k = (k + n - 1) % n;
+                    }
+                    let part = length[k].min(reach);
+                    weight += part;
+                    moment += part * angle;
+                    reach -= length[k];
+                    if k == i {
+                        break;
+                    }
+                }
+            }
+            if weight > 0.0 { moment / weight } else { 0.0 }
+        })
+        .collect()
 }
 
 /// Follows a curve from a step until it closes or meets the boundary.

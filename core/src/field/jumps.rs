@@ -7,9 +7,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::curves::{EdgePath, Step};
+use super::curves::{EdgePath, Step, left_fan};
 use super::metric::Metric;
-use crate::mesh::{EdgeId, HalfedgeId, TriMesh};
+use crate::mesh::{HalfedgeId, TriMesh};
 
 /// How often the fans are gone through: a change in one may upset another it shares an edge with.
 const ROUNDS: usize = 4;
@@ -53,9 +53,9 @@ fn set_across(mesh: &TriMesh, jump: &mut [i8], h: HalfedgeId, value: i32) {
     jump[e.index()] = small(if mesh.halfedge(e) == h { value } else { -value });
 }
 
-/// The branch of the cross in the triangle of `h` that is nearest to `h`.
-pub(super) fn branch_along(metric: &Metric, angle: &[f64], h: HalfedgeId) -> i32 {
-    quarter(((metric.direction(h) - angle[h.index() / 3]) / FRAC_PI_2).round() as i32)
+/// The branch of the cross in the triangle of `h` that is nearest to the direction `lean` counter-clockwise of `h`.
+pub(super) fn branch_along(metric: &Metric, angle: &[f64], h: HalfedgeId, lean: f64) -> i32 {
+    quarter(((metric.direction(h) + lean - angle[h.index() / 3]) / FRAC_PI_2).round() as i32)
 }
 
 /// The jumps of smallest rotation.
@@ -70,24 +70,18 @@ pub(super) fn principal(mesh: &TriMesh, metric: &Metric, angle: &[f64]) -> Vec<i
 
 /// Changes jumps so that the edges of every path continue each other on one branch, on both of its sides.
 pub(super) fn keep_on_branch(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &mut [i8], paths: &[EdgePath]) {
-    let mut on_path = vec![false; mesh.n_edges()];
-    let mut busy = vec![false; mesh.n_vertices()];
-    for step in paths.iter().flat_map(|p| &p.steps) {
-        on_path[step.edge.index()] = true;
-        busy[step.from(mesh).index()] = true;
-        busy[step.to(mesh).index()] = true;
-        if let (Some(l), Some(r)) = (step.left(mesh), step.right(mesh)) {
-            let value = branch_along(metric, angle, l) - (branch_along(metric, angle, r) + 2);
-            set_across(mesh, jump, l, value);
-        }
+    let (on_path, busy) = (vec![false; mesh.n_edges()], vec![false; mesh.n_vertices()]);
+    let mut mender = Mender { mesh, metric, angle, jump, on_path, busy };
+    for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
+        mender.take(*step, lean);
     }
     for _ in 0..ROUNDS {
         let mut changed = false;
         for path in paths {
-            for (a, b) in pairs(path) {
-                for (a, b) in [(a, b), (b.reversed(), a.reversed())] {
-                    changed |= mend(mesh, metric, angle, jump, (a, b), &on_path, &busy);
-                }
+            for (a, b) in path.pairs() {
+                let (a, b) = ((path.steps[a], path.lean[a]), (path.steps[b], path.lean[b]));
+                changed |= mender.mend(a, b);
+                changed |= mender.mend((b.0.reversed(), b.1), (a.0.reversed(), a.1));
             }
         }
         if !changed {
@@ -96,63 +90,62 @@ pub(super) fn keep_on_branch(mesh: &TriMesh, metric: &Metric, angle: &[f64], jum
     }
 }
 
-/// Consecutive steps of a path.
-fn pairs(path: &EdgePath) -> impl Iterator<Item = (Step, Step)> + '_ {
-    let n = path.steps.len();
-    (usize::from(!path.closed)..n).map(move |i| (path.steps[(i + n - 1) % n], path.steps[i]))
+/// Jumps being changed along paths.
+struct Mender<'a> {
+    mesh: &'a TriMesh,
+    metric: &'a Metric,
+    angle: &'a [f64],
+    jump: &'a mut [i8],
+    /// The edges of paths.
+    on_path: Vec<bool>,
+    /// The vertices of paths.
+    busy: Vec<bool>,
 }
 
-/// Mends the fan left of two consecutive steps; says whether anything was changed.
-fn mend(
-    mesh: &TriMesh,
-    metric: &Metric,
-    angle: &[f64],
-    jump: &mut [i8],
-    (a, b): (Step, Step),
-    on_path: &[bool],
-    busy: &[bool],
-) -> bool {
-    let Some(fan) = left_fan(mesh, a, b) else { return false };
-    let (Some(ha), Some(hb)) = (a.left(mesh), b.left(mesh)) else { return false };
-    if fan.is_empty() {
-        return false;
+impl Mender<'_> {
+    /// Marks an edge of a path and matches the branches on its two sides.
+    fn take(&mut self, step: Step, lean: f64) {
+        self.on_path[step.edge.index()] = true;
+        self.busy[step.from(self.mesh).index()] = true;
+        self.busy[step.to(self.mesh).index()] = true;
+        if let (Some(l), Some(r)) = (step.left(self.mesh), step.right(self.mesh)) {
+            let branch = |h| branch_along(self.metric, self.angle, h, lean);
+            let value = branch(l) - (branch(r) + 2);
+            set_across(self.mesh, self.jump, l, value);
+        }
     }
-    let sum: i32 = fan.iter().map(|&h| across(mesh, jump, h)).sum();
-    let mut lack = small(branch_along(metric, angle, hb) - sum - branch_along(metric, angle, ha));
-    let changed = lack != 0;
-    while lack != 0 {
-        let sign = i32::from(lack.signum());
-        // Not another path, rather not an edge to another path's vertex, then the largest turn of the right sign.
+
+    /// Changes jumps left of two consecutive steps until the second continues the first; says whether that was
+    /// needed.
+    fn mend(&mut self, (a, lean_a): (Step, f64), (b, lean_b): (Step, f64)) -> bool {
+        let mesh = self.mesh;
+        let (Some(fan), Some(ha), Some(hb)) = (left_fan(mesh, a, b), a.left(mesh), b.left(mesh)) else { return false };
+        let want =
+            branch_along(self.metric, self.angle, hb, lean_b) - branch_along(self.metric, self.angle, ha, lean_a);
+        let sum: i32 = fan.iter().map(|&h| across(mesh, self.jump, h)).sum();
+        let mut lack = small(want - sum);
+        let needed = lack != 0;
+        while lack != 0 {
+            let sign = lack.signum();
+            let Some(h) = self.cheapest(&fan, f64::from(sign)) else { return false };
+            let value = across(mesh, self.jump, h) + i32::from(sign);
+            set_across(mesh, self.jump, h, value);
+            lack -= sign;
+        }
+        needed
+    }
+
+    /// Where a change of the jump by `sign` costs least: not on a path, rather not towards one, and then where it
+    /// leaves the smallest rotation.
+    fn cheapest(&self, fan: &[HalfedgeId], sign: f64) -> Option<HalfedgeId> {
         let cost = |h: HalfedgeId| {
-            let e: EdgeId = mesh.edge(h);
-            let far = mesh.origin(h);
-            let kind = if on_path[e.index()] { 2 } else { i32::from(busy[far.index()]) };
-            (kind, -f64::from(sign) * rest(metric, mesh, angle, jump, h))
+            let far = self.busy[self.mesh.origin(h).index()];
+            let kind = if self.on_path[self.mesh.edge(h).index()] { 2 } else { u8::from(far) };
+            (kind, -sign * rest(self.metric, self.mesh, self.angle, self.jump, h))
         };
-        let best = fan.iter().copied().min_by(|&x, &y| {
+        fan.iter().copied().min_by(|&x, &y| {
             let (x, y) = (cost(x), cost(y));
             x.0.cmp(&y.0).then(x.1.total_cmp(&y.1))
-        });
-        let Some(best) = best else { return false };
-        let value = across(mesh, jump, best) + sign;
-        set_across(mesh, jump, best, value);
-        lack -= sign as i8;
-    }
-    changed
-}
-
-/// The half-edges crossed counter-clockwise around the vertex between two steps, from the triangle left of the
-/// second to the triangle left of the first; `None` if the boundary is in between.
-fn left_fan(mesh: &TriMesh, a: Step, b: Step) -> Option<Vec<HalfedgeId>> {
-    let end = a.left(mesh)?;
-    let mut h = b.left(mesh)?;
-    let mut fan = Vec::new();
-    loop {
-        let spoke = mesh.prev(h);
-        if spoke == end {
-            return Some(fan);
-        }
-        fan.push(spoke);
-        h = mesh.twin(spoke)?;
+        })
     }
 }

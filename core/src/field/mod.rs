@@ -6,9 +6,13 @@ mod cross;
 mod curves;
 mod jumps;
 mod metric;
+#[cfg(test)]
+pub(crate) mod samples;
 mod shape;
 mod singular;
 mod smooth;
+#[cfg(test)]
+mod tests;
 
 use thiserror::Error;
 

@@ -50,7 +50,7 @@ pub fn shape_field(
         pull.weight = mesh.faces().map(weight).collect();
     }
     let held = |e| mesh.is_boundary_edge(e) || sharp.get(e.index()).copied().unwrap_or(false);
-    let hard = along_edges(mesh, metric, mesh.edges().filter(|&e| held(e)));
+    let hard = along_edges(mesh, metric, mesh.edges().filter(|&e| held(e)).map(|e| (e, 0.0)));
     let vectors = interpolate_vectors(mesh, metric, &hard, &pull, progress)?;
     let angle: Vec<f64> = vectors.iter().map(|z| z.arg() / 4.0).collect();
     let jump = jumps::principal(mesh, metric, &angle);

@@ -5,6 +5,7 @@
 //! solution is checked against the matrix and refined once if need be, so that what comes back is either finite
 //! and of small residual or an error. Factors are computed by one thread: the same bits whatever the machine.
 
+use std::ops::{AddAssign, Mul, Sub};
 use std::sync::Arc;
 
 pub use faer::c64;
@@ -52,9 +53,7 @@ pub enum SolveError {
 }
 
 /// A number that a system may be made of.
-pub trait Scalar:
-    ComplexField + Copy + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
-{
+pub trait Scalar: ComplexField + Copy + AddAssign + Sub<Output = Self> + Mul<Output = Self> {
     /// Zero.
     const ZERO: Self;
     /// The complex conjugate.
@@ -118,7 +117,7 @@ impl<T: Scalar> SparseHermitian<T> {
             for &(r, v) in column.iter() {
                 if matrix.row.len() > first && matrix.row.last() == Some(&r) {
                     let last = matrix.value.len() - 1;
-                    matrix.value[last] = matrix.value[last] + v;
+                    matrix.value[last] += v;
                 } else {
                     matrix.row.push(r);
                     matrix.value.push(v);
@@ -140,9 +139,9 @@ impl<T: Scalar> SparseHermitian<T> {
         for c in 0..self.n() {
             for k in self.col_start[c] as usize..self.col_start[c + 1] as usize {
                 let (r, v) = (self.row[k] as usize, self.value[k]);
-                y[r] = y[r] + v * x[c];
+                y[r] += v * x[c];
                 if r != c {
-                    y[c] = y[c] + v.conjugate() * x[r];
+                    y[c] += v.conjugate() * x[r];
                 }
             }
         }
@@ -248,7 +247,7 @@ impl<T: Scalar> SpdFactor<T> {
         if max_norm(&rest) > REFINE_ABOVE * scale {
             self.substitute(&mut rest);
             for (x, d) in x.iter_mut().zip(&rest) {
-                *x = *x + *d;
+                *x += *d;
             }
             rest = residual(matrix, &x, rhs);
         }

@@ -207,3 +207,90 @@ fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
     let along = x * angle.cos() + y * angle.sin();
     PrincipalCurvature { k_min: mean - root, k_max: mean + root, d_min: along, d_max: n.cross(along) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A piece of the surface `point(u, v)` over `[0, 1]²`, of `n` by `m` quads, closed in `u`.
+    fn grid(n: u32, m: u32, closed_v: bool, point: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+        let rows = if closed_v { m } else { m + 1 };
+        let points = (0..n * rows)
+            .map(|k| point(f64::from(k / rows) / f64::from(n), f64::from(k % rows) / f64::from(m)))
+            .collect();
+        let id = |i: u32, j: u32| (i % n) * rows + j % rows;
+        let faces: Vec<[u32; 3]> = (0..n * m)
+            .flat_map(|k| {
+                let (i, j) = (k / m, k % m);
+                let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
+                [[a, b, c], [a, c, d]]
+            })
+            .collect();
+        TriMesh::from_faces(points, &faces).unwrap()
+    }
+
+    fn circle(u: f64) -> DVec3 {
+        let a = u * std::f64::consts::TAU;
+        DVec3::new(a.cos(), a.sin(), 0.0)
+    }
+
+    fn curvature(mesh: &TriMesh, radius: f64) -> Vec<PrincipalCurvature> {
+        principal_curvature(mesh, radius, &vec![false; mesh.n_edges()])
+    }
+
+    #[test]
+    fn a_cylinder_curves_across_its_axis() {
+        let mesh = grid(60, 40, false, |u, v| circle(u) * 0.5 + DVec3::Z * 4.0 * v);
+        for radius in [0.0, 0.3] {
+            for (v, c) in mesh.vertices().zip(curvature(&mesh, radius)) {
+                let z = mesh.position(v).z;
+                if (0.5..3.5).contains(&z) {
+                    assert!((c.k_max - 2.0).abs() < 0.1 && c.k_min.abs() < 0.05, "{radius} {c:?}");
+                    assert!(c.d_min.z.abs() > 0.99 && c.d_max.z.abs() < 0.1, "{radius} {c:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sphere_is_convex_in_all_directions() {
+        // A band of the sphere of radius 2, without its poles.
+        let mesh = grid(80, 40, false, |u, v| {
+            let b = (v - 0.5) * 2.6;
+            (circle(u) * b.cos() + DVec3::Z * b.sin()) * 2.0
+        });
+        for (v, c) in mesh.vertices().zip(curvature(&mesh, 0.4)) {
+            if mesh.position(v).z.abs() < 1.2 {
+                assert!((c.k_max - 0.5).abs() < 0.06 && (c.k_min - 0.5).abs() < 0.06, "{c:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_torus_has_its_textbook_curvatures() {
+        let (big, small) = (1.0, 0.4);
+        let tau = std::f64::consts::TAU;
+        let mesh = grid(120, 60, true, |u, v| {
+            circle(u) * (big + small * (v * tau).cos()) + DVec3::Z * small * (v * tau).sin()
+        });
+        for (v, c) in mesh.vertices().zip(curvature(&mesh, 0.12)) {
+            let p = mesh.position(v);
+            let rho = p.x.hypot(p.y);
+            let across = (rho - big) / small / rho;
+            assert!((c.k_max - 1.0 / small).abs() < 0.15, "{c:?}");
+            assert!((c.k_min - across).abs() < 0.15, "{c:?} at {rho}, expected {across}");
+            // The smaller curvature runs the long way round.
+            let round = DVec3::Z.cross(p).normalize();
+            assert!(c.d_min.dot(round).abs() > 0.98, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn directions_are_a_frame_and_flat_pieces_stay_finite() {
+        let flat = grid(6, 3, false, |u, v| circle(u) * (1.0 + v));
+        for c in curvature(&flat, 0.5) {
+            assert_eq!((c.k_min, c.k_max), (0.0, 0.0));
+            assert!(c.d_min.is_normalized() && c.d_max.is_normalized() && c.d_min.dot(c.d_max).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! Loops through several anchors, in order, each with or without a direction (Campen, chapter 8).
+//!
+//! A search state gains the leg it is on: leg `i` leads from anchor `i` to the next, and ends with the first state
+//! that leaves the next anchor. A field over all legs, backwards from the start anchor, holds the exact cheapest way
+//! to finish the round in any direction at the start. With it as potential, an A* search per start direction closes
+//! the loop with that direction. The field grows only as far as the best loop known costs, so the work follows the
+//! cost of the answer. The start is the anchor with the fewest directions: with a single one, one A* search is all.
+
+use glam::DVec3;
+
+use super::boundary::BoundaryField;
+use super::graph::{ElasticaGraph, NO_STATE, State};
+use super::mask::DirectionMask;
+use super::proposals::Proposals;
+use super::search::{Field, Meter, Route, SearchWorkspace, Stop};
+use crate::mesh::VertexId;
+use crate::progress::{Cancelled, Progress};
+
+/// How much farther the field grows when no loop was found within its radius.
+const GROWTH: f32 = 1.3;
+
+/// A place a loop has to pass, and the direction it has to pass it in, if any.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Anchor {
+    /// The place.
+    pub vertex: VertexId,
+    /// The direction; the geodesic nearest to it is taken.
+    pub direction: Option<DVec3>,
+}
+
+/// A loop wanted through anchors.
+#[derive(Debug, Clone, Copy)]
+pub struct AnchorQuery<'a> {
+    /// The anchors in the order in which the loop passes them.
+    pub anchors: &'a [Anchor],
+    /// Directions that are closed.
+    pub mask: &'a DirectionMask,
+    /// Most search states to settle before the best so far is returned unproved.
+    pub budget: u64,
+}
+
+impl ElasticaGraph {
+    /// The cheapest loop through all anchors in order; on open surfaces it may instead be a curve from boundary to
+    /// boundary that passes them in order.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn loop_through(
+        &self,
+        query: &AnchorQuery,
+        work: &mut SearchWorkspace,
+        progress: &Progress,
+    ) -> Result<Proposals, Cancelled> {
+        work.prepare(self, query.mask, progress)?;
+        let mut meter = Meter { progress, budget: query.budget, settled: 0 };
+        let mut best = None;
+        let outcome = Round::new(self, query, work).map_or(Ok(()), |mut r| r.solve(&mut meter, &mut best));
+        if outcome == Err(Stop::Cancelled) {
+            return Err(Cancelled);
+        }
+        if let (Some(route), Some(first)) = (best.as_mut().filter(|r| r.closed), query.anchors.first()) {
+            // The search started at another anchor.
+            let start = route.states.iter().position(|&e| self.origin(e) == first.vertex);
+            route.states.rotate_left(start.unwrap_or(0));
+        }
+        let loops = best.and_then(|route| self.found(&route)).into_iter().collect();
+        Ok(Proposals { loops, proved: outcome.is_ok(), settled: meter.settled })
+    }
+
+    /// The open state leaving `v` that is nearest to a direction.
+    pub(super) fn nearest(&self, mask: &DirectionMask, v: VertexId, direction: DVec3) -> Option<State> {
+        let nearness = |a: &State| self.departure(*a).dot(direction);
+        let out = self.leaving(v).filter(|&a| mask.is_open(a));
+        out.max_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(b.cmp(a)))
+    }
+}
+
+/// One search for a loop through anchors, which are stored from the start anchor on.
+struct Round<'a> {
+    graph: &'a ElasticaGraph,
+    mask: &'a DirectionMask,
+    /// States that may leave each anchor.
+    gates: Vec<Vec<State>>,
+    /// Per leg: distances backwards, on reversed states.
+    home: &'a mut Vec<Field>,
+    /// Per leg: distances of the A* search.
+    ahead: &'a mut Vec<Field>,
+    /// Per state of the start gate: cheapest round from it.
+    rounds: Vec<f32>,
+    open: Option<Route>,
+}
+
+impl<'a> Round<'a> {
+    fn new(graph: &'a ElasticaGraph, query: &AnchorQuery<'a>, work: &'a mut SearchWorkspace) -> Option<Self> {
+        let mask = query.mask;
+        let mut gates: Vec<Vec<State>> = query
+            .anchors
+            .iter()
+            .map(|a| match a.direction {
+                Some(d) => graph.nearest(mask, a.vertex, d).into_iter().collect(),
+                None => graph.leaving(a.vertex).filter(|&e| mask.is_open(e)).collect(),
+            })
+            .collect();
+        let start = (0..gates.len()).min_by_key(|&i| gates[i].len())?;
+        if gates[start].is_empty() {
+            return None;
+        }
+        let SearchWorkspace { home, ahead, boundary, .. } = work;
+        for legs in [&mut *home, &mut *ahead] {
+            legs.resize_with(gates.len().max(legs.len()), Field::default);
+        }
+        let open = boundary.as_ref().map(|b| Passage { graph, mask, gates: &gates, boundary: b });
+        let open = open.and_then(|p| p.cheapest(&mut ahead[..gates.len()]));
+        gates.rotate_left(start);
+        for leg in &mut home[..gates.len()] {
+            leg.restart(graph.n_states());
+        }
+        let rounds = vec![f32::INFINITY; gates[0].len()];
+        Some(Self { graph, mask, gates, home, ahead, rounds, open })
+    }
+
+    fn legs(&self) -> usize {
+        self.gates.len()
+    }
+
+    fn solve(&mut self, meter: &mut Meter, best: &mut Option<Route>) -> Result<(), Stop> {
+        best.clone_from(&self.open);
+        let last = self.legs() - 1;
+        for &b in &self.gates[0] {
+            let source = self.graph.reverse[b as usize];
+            self.home[last].set(source, 0.0, NO_STATE, 0);
+            self.home[last].push(0.0, source);
+        }
+        let cost = |best: &Option<Route>| best.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        let mut radius = self.grow(None, meter)? * GROWTH;
+        while radius.is_finite() {
+            let radius_now = radius.min(cost(best));
+            self.grow(Some(radius_now), meter)?;
+            let mut starts: Vec<usize> = (0..self.rounds.len()).collect();
+            starts.sort_by(|&i, &j| self.rounds[i].total_cmp(&self.rounds[j]).then(i.cmp(&j)));
+            for i in starts {
+                let limit = radius.min(cost(best));
+                if self.rounds[i] >= limit {
+                    break;
+                }
+                if let Some(route) = self.close(self.gates[0][i], limit, meter)? {
+                    *best = Some(route);
+                }
+            }
+            if cost(best) <= radius || earliest(&self.home[..=last]).is_none() {
+                break;
+            }
+            radius *= GROWTH;
+        }
+        Ok(())
+    }
+
+    /// Grows the fields over all legs to `radius`, or until the cheapest round is known; returns its cost.
+    fn grow(&mut self, radius: Option<f32>, meter: &mut Meter) -> Result<f32, Stop> {
+        let graph = self.graph;
+        let n = self.legs();
+        loop {
+            let cheapest = self.rounds.iter().copied().fold(f32::INFINITY, f32::min);
+            let Some(leg) = earliest(&self.home[..n]) else { return Ok(cheapest) };
+            if self.home[leg].top() >= radius.unwrap_or(cheapest) {
+                return Ok(cheapest);
+            }
+            let Some((d, y)) = self.home[leg].pop() else { return Ok(cheapest) };
+            if !self.home[leg].settle(d, y) {
+                continue;
+            }
+            meter.tick()?;
+            for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
+                let reached = d + graph.step(y, z);
+                if reached < self.home[leg].dist(z) {
+                    self.home[leg].set(z, reached, NO_STATE, 0);
+                    self.home[leg].push(reached, z);
+                }
+                // `rev z` leaves the anchor this leg starts at: the leg before may end with it.
+                if let Some(i) = position(&self.gates[leg], graph.reverse[z as usize]) {
+                    if leg == 0 {
+                        self.rounds[i] = self.rounds[i].min(reached);
+                    } else if reached < self.home[leg - 1].dist(z) {
+                        self.home[leg - 1].set(z, reached, NO_STATE, 0);
+                        self.home[leg - 1].push(reached, z);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The cheapest loop that leaves the start anchor by `x` and comes back into it, if it costs less than `limit`.
+    fn close(&mut self, x: State, limit: f32, meter: &mut Meter) -> Result<Option<Route>, Stop> {
+        let graph = self.graph;
+        let n = self.legs();
+        let ahead = &mut self.ahead[..n];
+        ahead.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
+        let (mut cost, mut end) = (limit, None);
+        let (mut leg, mut e, mut d, mut parent) = (0, x, 0.0, NO_STATE);
+        loop {
+            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
+                let reached = d + graph.step(e, f);
+                if leg + 1 == n && f == x {
+                    if reached < cost {
+                        (cost, end) = (reached, Some((leg, e)));
+                    }
+                    continue;
+                }
+                // Once the next anchor can be left, it is never cheaper to stay on this leg.
+                let to = if leg + 1 < n && position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
+                let key = reached + self.home[to].settled(graph.reverse[f as usize]);
+                if key < cost && reached < ahead[to].dist(f) {
+                    ahead[to].set(f, reached, parent, leg as u16);
+                    ahead[to].push(key, f);
+                }
+            }
+            let Some(next) = earliest(ahead) else { break };
+            let Some((key, s)) = ahead[next].pop_fresh() else { continue };
+            if key >= cost {
+                break;
+            }
+            meter.tick()?;
+            (leg, e, d, parent) = (next, s, ahead[next].dist(s), s);
+        }
+        let Some((leg, last)) = end else { return Ok(None) };
+        let mut states = vec![x];
+        states.extend(chain(ahead, leg, last));
+        Ok(Some(Route { cost, states, closed: true }))
+    }
+}
+
+/// The leg with the smallest key in its queue.
+fn earliest(legs: &[Field]) -> Option<usize> {
+    let tops = legs.iter().map(Field::top).enumerate().filter(|(_, top)| top.is_finite());
+    tops.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}
+
+/// Where a state is in a gate, which is sorted.
+fn position(gate: &[State], e: State) -> Option<usize> {
+    match (gate.first(), gate.last()) {
+        (Some(&first), Some(&last)) if (first..=last).contains(&e) => gate.binary_search(&e).ok(),
+        _ => None,
+    }
+}
+
+/// The states that lead to `e` on `leg`, over all legs; a label remembers the leg of its parent.
+fn chain(legs: &[Field], mut leg: usize, mut e: State) -> Vec<State> {
+    let mut states = Vec::new();
+    while e != NO_STATE {
+        states.push(e);
+        let (parent, before) = legs[leg].parent(e);
+        (leg, e) = (usize::from(before), parent);
+    }
+    states.reverse();
+    states
+}
+
+/// Open curves through anchors: from the boundary to the first, on to the last, and to the boundary.
+struct Passage<'a> {
+    graph: &'a ElasticaGraph,
+    mask: &'a DirectionMask,
+    gates: &'a [Vec<State>],
+    boundary: &'a BoundaryField,
+}
+
+impl Passage<'_> {
+    fn cheapest(&self, legs: &mut [Field]) -> Option<Route> {
+        let graph = self.graph;
+        let last = legs.len() - 1;
+        legs.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
+        for &b in &self.gates[0] {
+            let cost = self.boundary.field.dist(b);
+            if cost.is_finite() {
+                legs[0].set(b, cost, NO_STATE, 0);
+                legs[0].push(cost, b);
+            }
+        }
+        let (mut cost, mut end) = (f32::INFINITY, None);
+        while let Some(leg) = earliest(legs) {
+            let Some((d, e)) = legs[leg].pop() else { continue };
+            if d >= cost {
+                break;
+            }
+            if !legs[leg].settle(d, e) {
+                continue;
+            }
+            if leg == last {
+                let total = d + self.boundary.home(graph, e);
+                if total < cost {
+                    (cost, end) = (total, Some(e));
+                }
+                continue;
+            }
+            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
+                let reached = d + graph.step(e, f);
+                let to = if position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
+                if reached < legs[to].dist(f) {
+                    legs[to].set(f, reached, e, leg as u16);
+                    legs[to].push(reached, f);
+                }
+            }
+        }
+        let a = end?;
+        let passed = chain(legs, last, a);
+        let mut states = self.boundary.field.chain(*passed.first()?);
+        states.extend(&passed[1..]);
+        let out = self.boundary.field.chain(graph.reverse[a as usize]);
+        states.extend(out.iter().rev().skip(1).map(|&s| graph.reverse[s as usize]));
+        Some(Route { cost, states, closed: false })
+    }
+}

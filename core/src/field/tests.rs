@@ -1,0 +1,103 @@
+//! Checks of cross fields on shapes whose fields are known.
+
+use super::samples::*;
+use super::*;
+use crate::mesh::TriMesh;
+use crate::progress::Progress;
+
+fn sum(s: &[Singularity]) -> i64 {
+    s.iter().map(|s| i64::from(s.index)).sum()
+}
+
+fn shape(mesh: &TriMesh) -> CrossField {
+    shape_field(mesh, &Metric::new(mesh), None, &[], &Progress::new()).unwrap()
+}
+
+#[test]
+fn transport_around_a_vertex_is_its_curvature() {
+    let mesh = octasphere(4);
+    let metric = Metric::new(&mesh);
+    let total: f64 = mesh.vertices().map(|v| metric.curvature(&mesh, v)).sum();
+    assert!((total - 4.0 * std::f64::consts::PI).abs() < 1e-9);
+    for v in mesh.vertices() {
+        let around: f64 =
+            mesh.outgoing(v).map(|h| mesh.prev(h)).map(|h| metric.transport(h, mesh.twin(h).unwrap())).sum();
+        assert!(jumps::wrap(around - metric.curvature(&mesh, v)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_loop_on_a_torus_and_a_circle_on_a_ring_need_no_singularities() {
+    let torus = torus(96, 12);
+    let mut curves = Vec::new();
+    mark(&torus, &mut curves, 0, |p| p.x > 0.0 && p.y.abs() < 1e-9);
+    let ring = ring(40, 8);
+    let mut circle = Vec::new();
+    mark(&ring, &mut circle, 7, |p| (p.length() - 0.35).abs() < 1e-9);
+    for (mesh, curves, steps) in [(torus, curves, 12), (ring, circle, 40)] {
+        let paths = trace_curves(&mesh, &Metric::new(&mesh), &curves).unwrap();
+        assert_eq!((paths.len(), paths[0].closed, paths[0].steps.len()), (1, true, steps));
+        let metric = Metric::new(&mesh);
+        let field = interpolate(&mesh, &metric, &paths, &[], &Progress::new()).unwrap();
+        assert_eq!(field.singularities, vec![]);
+        for s in &paths[0].steps {
+            let h = s.left(&mesh).unwrap();
+            let along = mesh.vector(h).normalize();
+            let best = field.direction(&mesh, &metric, mesh.face(h), field.branch_along(&metric, h, 0.0));
+            assert!(along.dot(best) > 1.0 - 1e-9);
+        }
+    }
+}
+
+#[test]
+fn indices_sum_to_four_times_the_euler_characteristic() {
+    for holes in 0..=3 {
+        let mesh = plate(holes, 3);
+        assert_eq!(mesh.euler_characteristic(), i64::from(2 - 2 * holes));
+        assert_eq!(sum(&shape(&mesh).singularities), 4 * mesh.euler_characteristic());
+    }
+    let ring = ring(30, 6);
+    assert_eq!(sum(&shape(&ring).singularities), 0);
+    let square = TriMesh::from_faces(
+        vec![glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::ONE - glam::DVec3::Z, glam::DVec3::Y],
+        &[[0, 1, 2], [0, 2, 3]],
+    )
+    .unwrap();
+    let corners = shape(&square).singularities;
+    assert_eq!((corners.len(), sum(&corners)), (4, 4));
+}
+
+#[test]
+fn a_cube_keeps_its_eight_corners() {
+    let mesh = cells(&[[0, 0, 0]], 8);
+    let kept = pronounced(&mesh, &shape(&mesh).singularities, 0.05);
+    assert_eq!(kept.len(), 8);
+    for s in kept {
+        assert_eq!(s.index, 1);
+        assert!(mesh.position(s.vertex).to_array().iter().all(|x| x.abs() < 1e-9 || (x - 0.2).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn close_opposite_singularities_cancel() {
+    let mesh = torus(24, 12);
+    let at = |v: u32, index: i8| Singularity { vertex: crate::mesh::VertexId(v), index };
+    let list = [at(0, 1), at(1, -1), at(100, 2), at(101, -1), at(200, 1)];
+    assert_eq!(pronounced(&mesh, &list, 0.1), vec![at(100, 1), at(200, 1)]);
+    assert_eq!(pronounced(&mesh, &list, 1e-3), list.to_vec());
+}
+
+#[test]
+fn a_crossing_itself_and_an_open_end_are_told_apart() {
+    let mesh = torus(24, 12);
+    let mut curves = Vec::new();
+    // A meridian and the outer equator of one curve: a figure eight on the torus.
+    mark(&mesh, &mut curves, 3, |p| p.x > 0.0 && p.y.abs() < 1e-9);
+    mark(&mesh, &mut curves, 3, |p| (p.truncate().length() - 0.46).abs() < 1e-9);
+    let paths = trace_curves(&mesh, &Metric::new(&mesh), &curves).unwrap();
+    let mut lengths: Vec<usize> = paths.iter().map(|p| p.steps.len()).collect();
+    lengths.sort_unstable();
+    assert_eq!(lengths, vec![12, 24]);
+    curves[edge_between(&mesh, 0, 1).index()] = None;
+    assert!(matches!(trace_curves(&mesh, &Metric::new(&mesh), &curves), Err(FieldError::OpenCurve { curve: 3, .. })));
+}

@@ -1,0 +1,147 @@
+//! Strips: the seamless map of which placed curves are isolines, and what each curve's strip covers.
+//!
+//! The room for turning curves along edges into strips. It may use `mesh`, `field`, `solve` and `progress`; it
+//! does not know where the curves come from.
+
+mod conquer;
+mod cut;
+mod map;
+#[cfg(test)]
+mod tests;
+
+use glam::{DVec2, DVec3};
+use thiserror::Error;
+
+use crate::field::{self, CrossField, EdgePath, FieldError, Metric, trace_curves};
+use crate::mesh::{EdgeId, FaceId, TriMesh};
+use crate::progress::{Cancelled, Progress};
+use crate::solve::{EliminationError, SolveError};
+
+/// Why strips could not be computed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum StripError {
+    /// The cross field could not be computed.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The period jumps of the field contradict its singularities.
+    #[error("the cross field cannot be combed across {edge:?}")]
+    Topology {
+        /// The edge.
+        edge: EdgeId,
+    },
+    /// The constraints could not be eliminated.
+    #[error(transparent)]
+    Elimination(#[from] EliminationError),
+    /// The map could not be solved for.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The strip around one curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Strip {
+    /// The curve that is its spine.
+    pub curve: u32,
+    /// How far it reaches to the left and to the right of its spine, in lengths on the mesh.
+    pub bounds: [f64; 2],
+    /// Number of triangles it covers, counted once for each family.
+    pub faces: usize,
+}
+
+/// A seamless map with given curves as isolines, and the strips of these curves.
+#[derive(Debug, Clone)]
+pub struct StripMap {
+    /// The cross field the map follows.
+    pub field: CrossField,
+    /// Coordinates of each triangle's corners in the triangle's chart, in lengths on the mesh.
+    pub uv: Vec<[DVec2; 3]>,
+    /// Whether the map turns the triangle over or collapses it.
+    pub flipped: Vec<bool>,
+    /// One strip for each curve; for each piece if a curve has several.
+    pub strips: Vec<Strip>,
+    /// The strip (position in [`Self::strips`]) whose isolines pass a triangle: those of constant u, of constant v.
+    pub covered: Vec<[Option<u32>; 2]>,
+    /// For the covering strip, the distance from its spine at each corner, positive on its left; continuous across
+    /// charts within a strip. It is covered where this is within the strip's bounds.
+    pub stripe: Vec<[[f32; 3]; 2]>,
+    /// The largest difference of the kept coordinate along any edge of a curve.
+    pub residual: f64,
+}
+
+impl StripMap {
+    /// Computes field, map and strips for the curves along the edges of `mesh`.
+    ///
+    /// # Errors
+    ///
+    /// See [`StripError`].
+    pub fn new(mesh: &TriMesh, curve_of_edge: &[Option<u32>], progress: &Progress) -> Result<Self, StripError> {
+        let metric = Metric::new(mesh);
+        let paths = trace_curves(mesh, &metric, curve_of_edge)?;
+        progress.report("cross field", 0.0);
+        let field = field::interpolate(mesh, &metric, &paths, &[], progress)?;
+        progress.report("strip map", 0.4);
+        Self::along_field(mesh, &metric, &paths, field, progress)
+    }
+
+    /// Computes map and strips for `paths` and a field aligned with them.
+    ///
+    /// # Errors
+    ///
+    /// See [`StripError`].
+    pub fn along_field(
+        mesh: &TriMesh,
+        metric: &Metric,
+        paths: &[EdgePath],
+        field: CrossField,
+        progress: &Progress,
+    ) -> Result<Self, StripError> {
+        let cut = cut::cut(mesh, &field)?;
+        let uv = map::solve(mesh, metric, &field, &cut, paths, progress)?;
+        progress.report("strips", 0.9);
+        let flipped: Vec<bool> = uv.iter().map(|&[a, b, c]| (b - a).perp_dot(c - a) <= 0.0).collect();
+        let mut map = Self {
+            residual: residual(mesh, metric, &field, &cut, paths, &uv),
+            field,
+            uv,
+            flipped,
+            strips: Vec::new(),
+            covered: vec![[None; 2]; mesh.n_faces()],
+            stripe: vec![[[0.0; 3]; 2]; mesh.n_faces()],
+        };
+        let (field, uv, flipped) = (map.field.clone(), map.uv.clone(), map.flipped.clone());
+        let mean_edge = mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
+        let ground = conquer::Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped, mean_edge };
+        conquer::conquer(&ground, paths, &mut map);
+        Ok(map)
+    }
+
+    /// The unit tangent of the isolines of coordinate `axis` (0: u constant) in a triangle; zero where the map
+    /// collapses.
+    pub fn iso_direction(&self, mesh: &TriMesh, f: FaceId, axis: usize) -> DVec3 {
+        let [a, b, c] = mesh.face_vertices(f).map(|v| mesh.position(v));
+        let w = self.uv[f.index()].map(|w| w[axis]);
+        // The gradient is the sum of coordinates times normals of the opposite sides; turned, times the sides.
+        ((c - b) * w[0] + (a - c) * w[1] + (b - a) * w[2]).normalize_or_zero()
+    }
+}
+
+fn residual(
+    mesh: &TriMesh,
+    metric: &Metric,
+    field: &CrossField,
+    cut: &cut::Cut,
+    paths: &[EdgePath],
+    uv: &[[DVec2; 3]],
+) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
+        for (h, c) in map::kept_coordinates(mesh, metric, field, cut, *step, lean) {
+            let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c as usize]);
+            worst = worst.max((a - b).abs());
+        }
+    }
+    worst
+}

@@ -21,8 +21,8 @@ struct Vertex {
     @location(2) tint: vec4f,
     // Across strips of both families; a line runs wherever a coordinate is a whole number.
     @location(3) stripe: vec2f,
-    // Bit 0 and 1: covered by a strip of the first, of the second family.
-    @location(4) flags: u32,
+    // Up to which coordinate and down to which negative one the strip reaches, of the first and the second family.
+    @location(4) reach: vec4u,
 }
 
 struct Varying {
@@ -31,7 +31,7 @@ struct Varying {
     @location(1) normal: vec3f,
     @location(2) tint: vec4f,
     @location(3) stripe: vec2f,
-    @location(4) @interpolate(flat) flags: u32,
+    @location(4) @interpolate(flat) reach: vec4f,
     @location(5) corner: vec3f,
 }
 
@@ -43,7 +43,7 @@ fn vertex_main(in: Vertex, @builtin(vertex_index) index: u32) -> Varying {
     out.normal = in.normal;
     out.tint = in.tint;
     out.stripe = in.stripe;
-    out.flags = in.flags;
+    out.reach = vec4f(in.reach);
     out.corner = vec3f(f32(index % 3u == 0u), f32(index % 3u == 1u), f32(index % 3u == 2u));
     return out;
 }
@@ -58,13 +58,16 @@ fn view_direction(x: f32, y: f32, z: f32) -> vec3f {
     return normalize(x * view.view_axes[0].xyz + y * view.view_axes[1].xyz + z * view.view_axes[2].xyz);
 }
 
-// Coverage of a line of `width` pixels that runs where `coordinate` is whole; fades to its mean when too dense.
-fn stripe_line(coordinate: f32, width: f32) -> f32 {
+// How much of a pixel a strip covers (x), and the lines of `width` pixels along it (y): they run where `coordinate`
+// is whole, up to and with the ends of the strip, and fade to their mean where they are too dense.
+fn stripes(coordinate: f32, reach: vec2f, width: f32) -> vec2f {
     let per_pixel = max(length(vec2f(dpdx(coordinate), dpdy(coordinate))), 1e-6);
+    let to_end = min(reach.x - coordinate, coordinate + reach.y) / per_pixel;
+    let inside = clamp(to_end + 0.5 * width + 0.5, 0.0, 1.0) * f32(reach.x + reach.y > 0.0);
     let distance = abs(fract(coordinate + 0.5) - 0.5) / per_pixel;
     let line = clamp(0.5 * width + 0.5 - distance, 0.0, 1.0);
     let dense = smoothstep(0.18, 0.40, per_pixel);
-    return mix(line, min(width * per_pixel, 0.6), dense);
+    return inside * vec2f(1.0, mix(line, min(width * per_pixel, 0.6), dense));
 }
 
 fn encode(linear: vec3f) -> vec3f {
@@ -80,8 +83,8 @@ fn decode(c: vec3f) -> vec3f {
 fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     // Derivatives first, while control flow is still uniform.
     let width = 1.15 * view.toggles.w;
-    let line_u = stripe_line(in.stripe.x, width);
-    let line_v = stripe_line(in.stripe.y, width);
+    let stripes_u = stripes(in.stripe.x, in.reach.xy, width) * view.toggles.x;
+    let stripes_v = stripes(in.stripe.y, in.reach.zw, width) * view.toggles.x;
     let edge_width = fwidth(in.corner);
 
     let toward_eye = normalize(view.eye.xyz - in.world);
@@ -91,11 +94,8 @@ fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0
     // The material washed by the region, then by the strips.
     var albedo = select(BACK_MATERIAL, MATERIAL, front);
     albedo = mix(albedo, decode(in.tint.rgb), in.tint.a * view.toggles.z);
-    let covered_u = f32(in.flags & 1u) * view.toggles.x;
-    let covered_v = f32((in.flags >> 1u) & 1u) * view.toggles.x;
-    albedo = mix(albedo, STRIPE, 0.10 * (covered_u + covered_v));
-    let stripes = 1.0 - (1.0 - line_u * covered_u) * (1.0 - line_v * covered_v);
-    albedo = mix(albedo, STRIPE, 0.72 * stripes);
+    albedo = mix(albedo, STRIPE, 0.10 * (stripes_u.x + stripes_v.x));
+    albedo = mix(albedo, STRIPE, 0.72 * (1.0 - (1.0 - stripes_u.y) * (1.0 - stripes_v.y)));
 
     // Hemisphere, a key light over the viewer's left shoulder, a fill from the right, a rim from behind.
     let up = view.view_axes[1].xyz;

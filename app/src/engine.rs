@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use plait_core::mesh::TriMesh;
 use plait_core::progress::{Cancelled, Progress};
-use plait_core::surface::{SurfaceCurve, SurfacePoint};
+use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
 use thiserror::Error;
 
 /// Why the engine did not do what it was asked.
@@ -150,7 +150,8 @@ pub trait Engine: Send {
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
     /// What is to be shown now.
     fn scene(&self) -> Arc<Scene>;
-    /// Adds to the scene what takes long and may come later, such as the layout; returns whether the scene changed.
+    /// Adds to the scene something that takes long and may come later, such as stripes or the layout; returns whether
+    /// the scene changed, and is called until it did not.
     fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError>;
     /// Writes the design.
     fn save(&self, path: &Path) -> Result<(), EngineError>;
@@ -170,6 +171,8 @@ pub struct Scene {
     pub model: Arc<ModelFacts>,
     /// The mesh that is pointed at; the same value as long as the model is the same.
     pub design_mesh: Arc<TriMesh>,
+    /// Finds points of the design mesh.
+    pub index: Arc<SurfaceIndex>,
     /// What is drawn.
     pub surface: Arc<DisplaySurface>,
     /// Placed strips in order.
@@ -210,11 +213,17 @@ pub struct DisplaySurface {
     pub normals: Vec<[DVec3; 3]>,
     /// The colour of the region of each face; empty when there are no regions yet.
     pub regions: Vec<RegionColor>,
-    /// Coordinates across the strips of both families at the corners of each face, in units of the distance between
-    /// two lines of the stripe pattern; empty when there is no strip map.
-    pub stripes: Vec<[[f64; 2]; 3]>,
-    /// Whether a visible strip covers the face along the first, along the second family; empty as above.
-    pub covered: Vec<[bool; 2]>,
+    /// The stripe pattern of each face along both families; empty when there is no strip map.
+    pub stripes: Vec<[Option<Stripes>; 2]>,
+}
+
+/// The lines of the stripe pattern that run along one strip through one face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stripes {
+    /// At each corner the distance from the strip's spine, positive on its left, counted in lines of the pattern.
+    pub at: [f64; 3],
+    /// How many lines the strip has on the left and on the right of its spine; it ends with the last of them.
+    pub reach: [u8; 2],
 }
 
 /// How urgent a region is.

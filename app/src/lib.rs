@@ -4,7 +4,6 @@ pub mod camera;
 pub mod cli;
 pub mod engine;
 pub mod input;
-pub mod picker;
 pub mod render;
 pub mod shading;
 pub mod weaving;

@@ -7,6 +7,8 @@ use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
 
 /// Placed strips.
 pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
+/// Placed strips beside a layout.
+const FAINT: [u8; 4] = [0x1f, 0x5f, 0xd0, 0x70];
 /// The selected strip.
 pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
 /// What a click would place.
@@ -46,10 +48,7 @@ pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
     let mut vertices = Vec::with_capacity(display.faces.len() * 3);
     for (f, face) in display.faces.iter().enumerate() {
         let tint = display.regions.get(f).map_or([0; 4], |&c| tint(c));
-        let stripes = display.stripes.get(f).map_or([[0.0; 2]; 3], |s| relative_to_whole(*s));
-        let flags = display.covered.get(f).map_or(0, |&[u, v]| {
-            (if u { SurfaceVertex::COVERED_U } else { 0 }) | (if v { SurfaceVertex::COVERED_V } else { 0 })
-        });
+        let stripes = display.stripes.get(f).copied().unwrap_or_default();
         for corner in 0..3 {
             let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
             let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
@@ -57,18 +56,12 @@ pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
                 position: position.as_vec3().to_array(),
                 normal: normal.as_vec3().to_array(),
                 tint,
-                stripe: stripes[corner].map(|s| s as f32),
-                flags,
+                stripe: stripes.map(|s| s.map_or(0.0, |s| s.at[corner] as f32)),
+                reach: stripes.map(|s| s.map_or([0; 2], |s| s.reach)),
             });
         }
     }
     SurfaceMesh { vertices }
-}
-
-/// Coordinates less their whole part, which the pattern does not show but single precision would lose digits to.
-fn relative_to_whole(corners: [[f64; 2]; 3]) -> [[f64; 2]; 3] {
-    let whole = corners[0].map(f64::floor);
-    corners.map(|c| [c[0] - whole[0], c[1] - whole[1]])
 }
 
 /// Centre and radius of a sphere around all of the surface: around its box's centre.
@@ -138,14 +131,22 @@ pub struct Overlay<'a> {
 pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     let mut lines = Vec::new();
     let mut markers = Vec::new();
+    let layout = o.scene.layout.as_deref().filter(|_| o.layout);
     if o.strips {
         for strip in o.scene.strips.iter().filter(|s| s.visible) {
             let selected = o.selected == Some(strip.id);
-            let (color, width) = if selected { (SELECTED, 4.5) } else { (PLACED, 2.6) };
-            seamed(&mut lines, points(&strip.polyline), strip.closed, color, width);
+            let points = points(&strip.polyline);
+            match (selected, layout) {
+                (true, _) => seamed(&mut lines, points, strip.closed, SELECTED, 4.5),
+                (false, None) => seamed(&mut lines, points, strip.closed, PLACED, 2.6),
+                // Beside a layout, strips step back.
+                (false, Some(_)) => {
+                    lines.push(Polyline { points, closed: strip.closed, color: FAINT, width: 1.8, hidden: 0.0 });
+                }
+            }
         }
     }
-    if let Some(layout) = o.scene.layout.as_deref().filter(|_| o.layout) {
+    if let Some(layout) = layout {
         draw_layout(layout, &mut lines, &mut markers);
     }
     if let Some(proposal) = o.proposal {
@@ -193,11 +194,5 @@ mod tests {
         let sharp = corner_normals(&up(-2.0), &faces, 0.7);
         assert_eq!(sharp[0][0], DVec3::Z);
         assert!(sharp[1][0].dot(DVec3::Z) < 0.6);
-    }
-
-    #[test]
-    fn stripes_lose_only_their_whole_part() {
-        let moved = relative_to_whole([[1000.25, -3.5], [1001.0, -3.0], [1000.5, -4.25]]);
-        assert_eq!(moved, [[0.25, 0.5], [1.0, 1.0], [0.5, -0.25]]);
     }
 }

@@ -129,3 +129,98 @@ pub fn render_to_png(frame: &Frame, path: &Path) -> Result<(), HeadlessError> {
     picture.save_with_format(path, image::ImageFormat::Png)?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::Vec2;
+
+    use super::*;
+    use crate::camera::Camera;
+    use crate::render::{Marker, Polyline, SceneInput, SurfaceMesh, SurfaceVertex, Toggles};
+
+    const SIZE: [u32; 2] = [200, 160];
+
+    /// A square in the plane z = 0, and what lies at depth `z` over its middle.
+    fn frame(stripes: bool, lines: Vec<Polyline>, markers: Vec<Marker>) -> Frame {
+        let corner = |x: f32, y: f32| SurfaceVertex {
+            position: [x, y, 0.0],
+            normal: [0.0, 0.0, 1.0],
+            tint: [0; 4],
+            stripe: [x * 10.0, y * 10.0],
+            reach: [[3, 3], [0, 0]],
+        };
+        let [a, b, c, d] = [corner(-0.4, -0.4), corner(0.4, -0.4), corner(0.4, 0.4), corner(-0.4, 0.4)];
+        let camera = Camera { yaw: 0.0, pitch: 0.0, ..Camera::default() };
+        Frame {
+            scene: SceneInput {
+                surface: Arc::new(SurfaceMesh { vertices: vec![a, b, c, a, c, d] }),
+                lines: Arc::new(lines),
+                markers: Arc::new(markers),
+            },
+            view: camera.uniforms(Vec2::new(SIZE[0] as f32, SIZE[1] as f32)),
+            toggles: Toggles { stripes, ..Toggles::default() },
+            size: SIZE,
+            pixels_per_point: 1.0,
+        }
+    }
+
+    fn line(z: f32, hidden: f32) -> Polyline {
+        let points = vec![[-0.3, 0.0, z], [0.0, 0.0, z], [0.3, 0.0, z]];
+        Polyline { points, closed: false, color: [0, 255, 0, 255], width: 4.0, hidden }
+    }
+
+    fn greens(picture: &image::RgbaImage) -> usize {
+        picture.pixels().filter(|p| p[1] > 200 && p[0] < 60).count()
+    }
+
+    #[test]
+    fn lines_are_seen_before_the_surface_and_not_behind_it() {
+        let mut gpu = Headless::new().unwrap();
+        let front = gpu.render(&frame(false, vec![line(0.0, 0.0)], vec![])).unwrap();
+        // 0.6 units of a width of about 1.47 units on 200 pixels, four pixels wide.
+        assert!((200..600).contains(&greens(&front)), "{}", greens(&front));
+        let behind = gpu.render(&frame(false, vec![line(-0.3, 0.0)], vec![])).unwrap();
+        assert_eq!(greens(&behind), 0);
+        let faint = gpu.render(&frame(false, vec![line(-0.3, 0.3)], vec![])).unwrap();
+        assert_ne!(faint, behind);
+    }
+
+    #[test]
+    fn joints_do_not_cover_twice() {
+        let mut gpu = Headless::new().unwrap();
+        let mut half = line(0.01, 0.0);
+        half.color[3] = 128;
+        let whole = Polyline { points: vec![half.points[0], half.points[2]], ..half.clone() };
+        let (jointed, whole) =
+            (gpu.render(&frame(false, vec![half], vec![])), gpu.render(&frame(false, vec![whole], vec![])));
+        let (jointed, whole) = (jointed.unwrap(), whole.unwrap());
+        let worst = jointed.pixels().zip(whole.pixels()).map(|(a, b)| a[1].abs_diff(b[1])).max();
+        assert!(worst.is_some_and(|w| w < 12), "{worst:?}");
+    }
+
+    #[test]
+    fn markers_and_stripes_show() {
+        let mut gpu = Headless::new().unwrap();
+        let marker = Marker { position: [0.1, 0.1, 0.0], color: [0, 255, 0, 255], radius: 6.0, hidden: 0.0 };
+        let marked = gpu.render(&frame(false, vec![], vec![marker])).unwrap();
+        assert!((50..130).contains(&greens(&marked)), "{}", greens(&marked));
+        let blue = |p: &image::RgbaImage| p.pixels().filter(|p| p[2] > p[0].saturating_add(40)).count();
+        assert_eq!(blue(&gpu.render(&frame(false, vec![], vec![])).unwrap()), 0);
+        assert!(blue(&gpu.render(&frame(true, vec![], vec![])).unwrap()) > 300);
+    }
+
+    #[test]
+    fn the_surface_is_redrawn_only_when_it_changed() {
+        let mut gpu = Headless::new().unwrap();
+        let first = frame(false, vec![], vec![]);
+        gpu.render(&first).unwrap();
+        gpu.render(&first).unwrap();
+        let lines = SceneInput { lines: Arc::new(vec![line(0.0, 0.0)]), ..first.scene.clone() };
+        gpu.render(&Frame { scene: lines, ..first.clone() }).unwrap();
+        assert_eq!(gpu.renderer.redraws(), 1);
+        gpu.render(&Frame { toggles: Toggles { wireframe: true, ..first.toggles }, ..first }).unwrap();
+        assert_eq!(gpu.renderer.redraws(), 2);
+    }
+}

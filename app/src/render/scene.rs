@@ -16,15 +16,9 @@ pub struct SurfaceVertex {
     pub tint: [u8; 4],
     /// Coordinates across the strips of both families: a line is drawn wherever one is a whole number.
     pub stripe: [f32; 2],
-    /// [`Self::COVERED_U`] and [`Self::COVERED_V`].
-    pub flags: u32,
-}
-
-impl SurfaceVertex {
-    /// Flag: a strip of the first family covers the triangle.
-    pub const COVERED_U: u32 = 1;
-    /// Flag: a strip of the second family covers the triangle.
-    pub const COVERED_V: u32 = 2;
+    /// For both families, up to which coordinate and down to which negative one the strip reaches; both zero where
+    /// none covers the triangle. The same at all corners of a triangle.
+    pub reach: [[u8; 2]; 2],
 }
 
 /// Triangles, each with three corners of its own.

@@ -1,6 +1,7 @@
 //! The engine of the window: a session of the library behind [`Engine`], with its snapshots.
 
 mod snapshot;
+mod stripes;
 mod words;
 
 use std::path::Path;
@@ -15,8 +16,8 @@ use plait_core::surface::SurfacePoint;
 use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
 use crate::engine::{
-    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal,
-    Refinement, Scene, Source, StripId,
+    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal, Refinement,
+    Scene, Source, StripId,
 };
 
 /// File name ending of designs.
@@ -102,22 +103,32 @@ fn region_place(arrangement: &Arrangement, region: usize) -> Option<DVec3> {
 struct SessionEngine {
     session: Session,
     scene: Arc<Scene>,
-    /// The layout of the strips that it was made for, if they make one.
-    preview: Option<(Arc<Woven>, Option<Arc<LayoutPreview>>)>,
     model: snapshot::ModelSnapshot,
+    later: Later,
+}
+
+/// What is computed after a change, while nothing else is asked: of the strips it was computed for, or not yet
+/// (outer `None`), or in vain (inner `None`).
+#[derive(Default)]
+pub struct Later {
+    woven: Option<Arc<Woven>>,
+    layout: Option<Option<Arc<LayoutPreview>>>,
 }
 
 impl SessionEngine {
     fn new(session: Session) -> Self {
         let model = snapshot::ModelSnapshot::new(&session);
-        let scene = Arc::new(model.scene(&session, None));
-        Self { session, scene, preview: None, model }
+        let later = Later { woven: Some(Arc::clone(session.woven())), ..Later::default() };
+        let scene = Arc::new(model.scene(&session, &later));
+        Self { session, scene, model, later }
     }
 
     fn refresh(&mut self) {
-        let current = self.preview.as_ref().filter(|(woven, _)| Arc::ptr_eq(woven, self.session.woven()));
-        let preview = current.and_then(|(_, preview)| preview.clone());
-        self.scene = Arc::new(self.model.scene(&self.session, preview));
+        let woven = self.session.woven();
+        if !self.later.woven.as_ref().is_some_and(|w| Arc::ptr_eq(w, woven)) {
+            self.later = Later { woven: Some(Arc::clone(woven)), ..Later::default() };
+        }
+        self.scene = Arc::new(self.model.scene(&self.session, &self.later));
     }
 
     fn changed<T>(&mut self, result: Result<T, WeaveError>) -> Result<T, EngineError> {
@@ -183,23 +194,13 @@ impl Engine for SessionEngine {
     }
 
     fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError> {
-        if self.preview.as_ref().is_some_and(|(woven, _)| Arc::ptr_eq(woven, self.session.woven())) {
+        if self.later.layout.is_some() {
             return Ok(false);
         }
-        let preview = match layout_preview(&self.session, progress) {
-            Ok(preview) => Some(Arc::new(preview)),
-            Err(WeaveError::Cancelled(_)) => return Err(EngineError::Cancelled),
-            Err(error) => {
-                tracing::debug!(%error, "no layout is shown");
-                None
-            }
-        };
-        let shown = preview.is_some();
-        self.preview = Some((Arc::clone(self.session.woven()), preview));
-        if shown {
-            self.refresh();
-        }
-        Ok(shown)
+        let layout = or_nothing(layout_preview(&self.session, progress), progress)?;
+        self.later.layout = Some(layout.map(Arc::new));
+        self.refresh();
+        Ok(true)
     }
 
     fn save(&self, path: &Path) -> Result<(), EngineError> {
@@ -230,6 +231,18 @@ impl Engine for SessionEngine {
         let files = ["design.plait", "layout.obj", "quads.obj", "patches.obj", "report.json"];
         Ok(ExportReport { files: files.map(|f| folder.join(f)).to_vec(), summary })
     }
+}
+
+/// What can do without is left out when it fails.
+fn or_nothing<T>(result: Result<T, impl std::fmt::Display>, progress: &Progress) -> Result<Option<T>, EngineError> {
+    progress.check()?;
+    result.map_or_else(
+        |error| {
+            tracing::debug!(%error, "something is not shown");
+            Ok(None)
+        },
+        |value| Ok(Some(value)),
+    )
 }
 
 /// Nodes and arcs of the layout on the surface.

@@ -7,8 +7,8 @@ use plait_core::dual::RefinedMesh;
 use plait_core::mesh::{FaceId, TriMesh};
 use plait_core::weave::Session;
 
-use super::words;
-use crate::engine::{DisplaySurface, LayoutPreview, ModelFacts, Scene, Strip, StripId};
+use super::{Later, stripes, words};
+use crate::engine::{DisplaySurface, ModelFacts, Scene, Strip, StripId};
 use crate::shading::corner_normals;
 
 /// What stays the same while strips come and go.
@@ -27,7 +27,7 @@ impl ModelSnapshot {
     }
 
     /// The present state of `session`.
-    pub fn scene(&self, session: &Session, layout: Option<Arc<LayoutPreview>>) -> Scene {
+    pub fn scene(&self, session: &Session, later: &Later) -> Scene {
         let (model, design) = (session.model(), session.design());
         let (summary, exportable) = words::summary(session);
         let strips = design.strips.iter().map(|s| Strip {
@@ -40,12 +40,13 @@ impl ModelSnapshot {
         Scene {
             model: Arc::clone(&self.facts),
             design_mesh: Arc::clone(&model.mesh),
+            index: Arc::clone(&model.index),
             surface: Arc::new(self.surface(session)),
             strips: strips.collect(),
             remains: words::remains(session),
             summary,
             exportable,
-            layout,
+            layout: later.layout.clone().flatten(),
             can_undo: session.can_undo(),
             can_redo: session.can_redo(),
         }
@@ -63,14 +64,9 @@ impl ModelSnapshot {
             let color = |&r: &u32| words::color(woven.reports[r as usize].colour);
             woven.arrangement.region_of_face.iter().map(color).collect()
         };
-        DisplaySurface {
-            positions: refined.positions.clone(),
-            faces,
-            normals,
-            regions,
-            stripes: Vec::new(),
-            covered: Vec::new(),
-        }
+        let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
+        let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
+        DisplaySurface { positions: refined.positions.clone(), faces, normals, regions, stripes }
     }
 
     /// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.

@@ -22,7 +22,6 @@ use view::{Hover, Prepared};
 use crate::camera::Camera;
 use crate::engine::{EngineError, ExportOptions, Opener, Refinement, RegionColor, Scene, Source, StripId};
 use crate::input::Input;
-use crate::picker::Picker;
 use crate::render::Renderer;
 use crate::shading;
 use crate::worker::{Job, Reply, Running, Worker};
@@ -54,7 +53,6 @@ pub struct PlaitApp {
     worker: Worker,
     built_ins: Vec<crate::engine::BuiltIn>,
     scene: Option<Arc<Scene>>,
-    picker: Option<Arc<Picker>>,
     camera: Camera,
     input: Input,
     hover: Hover,
@@ -96,7 +94,6 @@ impl PlaitApp {
             worker,
             built_ins,
             scene: None,
-            picker: None,
             camera: Camera::default(),
             input: Input::default(),
             hover: Hover::default(),
@@ -135,7 +132,9 @@ impl PlaitApp {
 
     /// The point of the surface that appears at `at`.
     fn pick(&self, at: Vec2) -> Option<SurfacePoint> {
-        self.picker.as_ref()?.pick(self.camera.ray(at, self.view_size))
+        let ray = self.camera.ray(at, self.view_size);
+        let hit = self.scene.as_ref()?.index.ray(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        hit.map(|(point, _)| point)
     }
 
     /// The place that the newest message speaks of.
@@ -158,7 +157,7 @@ impl PlaitApp {
     fn take_replies(&mut self) {
         while let Some(reply) = self.worker.reply() {
             match reply {
-                Reply::Opened { source, scene, picker } => self.opened(&source, scene, picker),
+                Reply::Opened { source, scene } => self.opened(&source, scene),
                 Reply::Changed(scene) => self.changed(scene),
                 Reply::Completed(scene) => self.scene = Some(scene),
                 Reply::Proposals { generation, proposals, complete } => {
@@ -182,13 +181,12 @@ impl PlaitApp {
         }
     }
 
-    fn opened(&mut self, source: &Source, scene: Arc<Scene>, picker: Arc<Picker>) {
+    fn opened(&mut self, source: &Source, scene: Arc<Scene>) {
         self.messages.clear();
         if !scene.model.repairs.is_empty() {
             let text = format!("{} was repaired on opening: {}", source.name(), scene.model.repairs.join("; "));
             self.messages.add(Tone::Note, text, None);
         }
-        self.picker = Some(picker);
         self.selected = None;
         self.hover = Hover::default();
         self.scene = Some(scene);

@@ -306,13 +306,14 @@ fn what_remains(scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 fn remark_row(remark: &Remark, color: Color32, ui: &mut Ui, actions: &mut Vec<Action>) {
-    ui.horizontal(|ui| {
+    ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(12.0, 18.0), egui::Sense::hover());
         ui.painter().circle_filled(rect.center(), 5.0, color);
+        let label = egui::Label::new(&remark.text).wrap();
         match remark.place {
-            None => drop(ui.label(&remark.text)),
+            None => drop(ui.add(label)),
             Some(place) => {
-                let link = ui.add(egui::Label::new(&remark.text).sense(egui::Sense::click()));
+                let link = ui.add(label.sense(egui::Sense::click()));
                 if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
                     actions.push(Action::LookAt(place));
                 }
@@ -326,7 +327,8 @@ fn strip_row(app: &PlaitApp, index: usize, strip: &Strip, ui: &mut Ui, actions: 
     let name = format!("Strip {}", index + 1);
     // The row takes clicks wherever no button on it does.
     let (rect, row) = ui.allocate_exact_size(vec2(ui.available_width(), 28.0), egui::Sense::click());
-    row.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &name));
+    let label = format!("Select {name}");
+    row.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &label));
     let fill = match (selected, row.hovered()) {
         (true, _) => theme::ACCENT_WASH,
         (false, true) => Color32::from_black_alpha(8),

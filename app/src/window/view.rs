@@ -202,7 +202,7 @@ fn carry_out(app: &mut PlaitApp, intent: Intent) {
         Intent::Orbit(delta) => app.camera.orbit(delta),
         Intent::Pan(delta) => app.camera.pan(delta, app.view_size),
         Intent::Zoom(factor, at) => {
-            let toward = app.hover.point.zip(app.picker.as_ref()).map(|(p, k)| p.position(k.mesh()).as_vec3());
+            let toward = app.hover.point.zip(app.scene.as_ref()).map(|(p, s)| p.position(&s.design_mesh).as_vec3());
             let toward = toward.unwrap_or_else(|| app.camera.point_at_target_depth(at, app.view_size));
             app.camera.zoom(factor, toward);
         }

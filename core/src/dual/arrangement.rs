@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::insert::CurveInserter;
 use super::refined::{Mark, NONE, NoRoute, RefinedMesh, next};
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, TriMeshError};
 use crate::surface::{CurveError, SurfaceCurve};
 
 /// Why curves could not be arranged.
@@ -39,6 +39,9 @@ pub enum ArrangementError {
         /// Number of curve edges there.
         degree: usize,
     },
+    /// The refined mesh is no manifold; the drawing rules exclude it.
+    #[error("the arrangement is not a manifold: {0}")]
+    Mesh(#[from] TriMeshError),
 }
 
 /// A transversal crossing of two curves (or of one with itself): a patch of the layout.

@@ -4,6 +4,7 @@
 //! the document, a plain value; a [`Session`] holds both together with what is derived from them.
 
 mod design;
+mod detour;
 mod export;
 mod model;
 mod script;

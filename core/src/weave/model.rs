@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::session::WeaveError;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
 use crate::field::{Guides, Metric, pronounced, shape_field};
-use crate::mesh::{LoadedMesh, SHARP_DIHEDRAL, Topology, TriMesh, VertexId, sharp_edges};
+use crate::mesh::{
+    LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
+};
 use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
 
@@ -49,7 +51,7 @@ pub struct Model {
     /// The elastica graph.
     pub graph: ElasticaGraph,
     /// Points by ray or nearness.
-    pub index: SurfaceIndex,
+    pub index: Arc<SurfaceIndex>,
     /// Pronounced corners of the shape: singularities of its smooth curvature-guided cross field, with their
     /// index in quarters.
     pub corners: Vec<(VertexId, i8)>,
@@ -65,8 +67,9 @@ impl Model {
         let mesh = Arc::new(loaded.mesh.clone());
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&mesh);
-        let sharp = sharp_edges(&mesh, options.sharp_dihedral);
-        let index = SurfaceIndex::new(&mesh);
+        let mut sharp = sharp_edges(&mesh, options.sharp_dihedral);
+        drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
+        let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
         let curvature = principal_curvature(&mesh, options.curvature_radius, &sharp);

@@ -9,11 +9,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::detour::detours;
 use super::session::{Proposal, Session, WeaveError, polished};
 use crate::dual::{Colour, Finding, RegionReport, assess};
 use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
+use crate::surface::{RelaxOptions, relax};
 
 /// How far a layout is to be woven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,9 +45,22 @@ pub enum Stuck {
 /// Points tried in the most urgent region: enough to meet each of its limbs.
 const POINTS: usize = 12;
 /// Candidates tried in the arrangement, the cheapest first.
-const TRIED: usize = 24;
+const TRIED: usize = 48;
 /// Search states settled per point, at most: bounds the time on large meshes.
-const BUDGET: u64 = 400_000;
+const BUDGET: u64 = 200_000;
+/// Classes of curves tried per region when no elastica loop helps.
+const DETOURS: usize = 200;
+/// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edges: it is jagged.
+const WIDE_TUBE: f64 = 6.0;
+
+/// How loops are searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Search {
+    /// The cheapest through each point and its alternatives.
+    Cheapest,
+    /// The cheapest through each point in each of several directions.
+    Around,
+}
 
 impl Session {
     /// The strip that helps most now towards `goal`.
@@ -59,35 +74,74 @@ impl Session {
         let urgent = urgent_regions(&woven.reports, goal);
         let Some(&first) = urgent.first() else { return Err(Stuck::Done.into()) };
         let open = DirectionMask::none();
-        // First where and how strips should go; then anywhere in the urgent regions; then in any direction.
-        for (mask, regions) in [(&woven.mask, 1), (&woven.mask, 4), (&open, 4)] {
+        // First where and how strips should go; then in every direction, wherever it is urgent; then also
+        // along strips that are there; at last by connectivity alone.
+        let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
+        for (search, mask, regions) in stages {
             for &region in urgent.iter().take(regions) {
-                let candidates = self.candidates(region, mask, progress)?;
+                let candidates = self.candidates(region, search, mask, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
                     return Ok(best);
                 }
+            }
+        }
+        for &region in &urgent {
+            let root = woven.arrangement.regions[region as usize].faces[0];
+            let curves = detours(&woven.arrangement, &self.model().mesh, root, DETOURS);
+            if let Some(best) = self.best_of(curves, before, goal, progress)? {
+                return Ok(self.smoothed(best, progress));
             }
         }
         let reason = woven.reports[first as usize].findings.first().map(ToString::to_string).unwrap_or_default();
         Err(Stuck::NoHelp { region: first, reason }.into())
     }
 
+    /// A curve that was found by connectivity alone, relaxed.
+    fn smoothed(&self, proposal: Proposal, progress: &Progress) -> Proposal {
+        let options = RelaxOptions { tube: WIDE_TUBE, ..Default::default() };
+        match relax(&self.model().mesh, &proposal.curve, &options, progress) {
+            Ok(relaxed) => Proposal { curve: relaxed.curve, cost: proposal.cost },
+            Err(_) => proposal,
+        }
+    }
+
     /// Loops through well-spread points of a region, the cheapest first.
-    fn candidates(&self, region: u32, mask: &DirectionMask, progress: &Progress) -> Result<Vec<Proposal>, WeaveError> {
+    fn candidates(
+        &self,
+        region: u32,
+        search: Search,
+        mask: &DirectionMask,
+        progress: &Progress,
+    ) -> Result<Vec<Proposal>, WeaveError> {
         let graph = &self.model().graph;
-        let points = spread_points(self, region);
-        let found: Vec<Vec<Proposal>> = points
+        let queries: Vec<(VertexId, Option<DVec3>)> = spread_points(self, region)
+            .into_iter()
+            .flat_map(|v| match search {
+                Search::Cheapest => vec![(v, None)],
+                Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
+            })
+            .collect();
+        let found: Vec<Vec<Proposal>> = queries
             .par_iter()
-            .map_init(SearchWorkspace::new, |work, &vertex| {
-                let query = ProposalQuery { budget: BUDGET, ..ProposalQuery::alternatives(vertex, mask) };
+            .map_init(SearchWorkspace::new, |work, &(vertex, direction)| {
+                let query = ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
                 let found = graph.proposals(&query, work, progress)?;
                 found.loops.iter().map(|l| polished(graph, l, None, progress)).collect()
             })
             .collect::<Result<_, WeaveError>>()?;
         let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        all.truncate(4 * TRIED);
+        all.truncate(TRIED);
         Ok(all)
+    }
+
+    /// Four tangent directions at a vertex, all around.
+    fn directions(&self, v: VertexId) -> [DVec3; 4] {
+        let mesh = &self.model().mesh;
+        let normal: DVec3 = mesh.outgoing(v).map(|h| mesh.face_area_vector(mesh.face(h))).sum();
+        let n = normal.normalize_or(DVec3::Z);
+        let (x, y) = n.any_orthonormal_pair();
+        [x, x + y, y, y - x]
     }
 
     /// The candidate of least cost per step of progress, if any makes progress.

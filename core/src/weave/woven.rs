@@ -1,11 +1,17 @@
 //! What the placed strips make of the surface: arrangement, assessment, strip map, directions still open.
 
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
 use super::design::Strip;
 use super::model::Model;
 use super::session::WeaveError;
-use crate::dual::{Arrangement, Colour, RegionReport, assess};
+use crate::dual::{Arrangement, ArrangementError, Colour, Mark, RegionReport, assess};
 use crate::elastica::DirectionMask;
-use crate::progress::Progress;
+use crate::mesh::{FaceId, TriMesh};
+use crate::progress::{Cancelled, Progress};
+use crate::strip::StripMap;
 
 /// Strips within this angle of a placed one's isolines are equivalent to it (Campen, section 8.2.2).
 const COMPATIBLE: f64 = std::f64::consts::FRAC_PI_4;
@@ -19,6 +25,10 @@ pub struct Woven {
     pub reports: Vec<RegionReport>,
     /// Directions in which no further strip may run.
     pub mask: DirectionMask,
+    /// The refined mesh of the arrangement as a mesh of its own.
+    pub mesh: TriMesh,
+    /// The map of all strips on that mesh; `None` without strips, or where it cannot be computed.
+    pub strip_map: Option<StripMap>,
 }
 
 impl Woven {
@@ -31,11 +41,16 @@ impl Woven {
         let arrangement = Arrangement::new(&model.mesh, strips.iter().map(|s| &s.curve))?;
         progress.check()?;
         let reports = assess(&arrangement, &model.mesh, &model.corners);
+        let mesh = arrangement.refined.to_mesh().map_err(ArrangementError::from)?;
+        let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
         let mut mask = DirectionMask::none();
         for strip in strips {
             close_along(model, strip, &mut mask);
         }
-        Ok(Self { arrangement, reports, mask })
+        if let Some(map) = &strip_map {
+            close_inside(model, &arrangement, &mesh, map, &mut mask);
+        }
+        Ok(Self { arrangement, reports, mask, mesh, strip_map })
     }
 
     /// The regions that cannot be nodes yet.
@@ -58,5 +73,43 @@ fn close_along(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
         let Some(face) = curve.face_before(mesh, i) else { continue };
         let direction = curve.point(mesh, i) - curve.point(mesh, (i + n - 1) % n);
         model.graph.disable_near(mask, face, direction, COMPATIBLE);
+    }
+}
+
+/// Closes the directions along the isolines of the strips that cover each triangle.
+fn close_inside(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: &StripMap, mask: &mut DirectionMask) {
+    let mut largest: BTreeMap<(u32, u32), (f64, DVec3)> = BTreeMap::new();
+    for f in mesh.faces() {
+        for (axis, strip) in map.covered[f.index()].iter().enumerate() {
+            let Some(strip) = strip else { continue };
+            // Of the pieces of one original triangle the largest speaks for all.
+            let entry = largest.entry((arrangement.refined.base_face(f.0), *strip)).or_insert((-1.0, DVec3::ZERO));
+            let area = mesh.face_area(f);
+            if area > entry.0 {
+                *entry = (area, map.iso_direction(mesh, f, axis));
+            }
+        }
+    }
+    for ((face, _), (_, direction)) in largest {
+        if direction != DVec3::ZERO {
+            model.graph.disable_near(mask, FaceId(face), direction, COMPATIBLE);
+        }
+    }
+}
+
+/// The strip map of an arrangement; without one strips are lines that close the directions beside them only.
+fn strip_map(arrangement: &Arrangement, mesh: &TriMesh, progress: &Progress) -> Result<Option<StripMap>, Cancelled> {
+    let curve = |e| match arrangement.refined.mark(mesh.halfedge(e).0) {
+        Mark::Curve(c) => Some(c),
+        _ => None,
+    };
+    let curves: Vec<Option<u32>> = mesh.edges().map(curve).collect();
+    match StripMap::new(mesh, &curves, progress) {
+        Ok(map) => Ok(Some(map)),
+        Err(error) => {
+            progress.check()?;
+            tracing::warn!(%error, "no strip map");
+            Ok(None)
+        }
     }
 }

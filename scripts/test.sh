@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Runs all tests, with what they need: a software GPU, a virtual screen, and Python for an independent check.
+#
+#     scripts/test.sh [ARGUMENTS OF cargo test]
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+# shellcheck source=scripts/packages.sh
+source scripts/packages.sh
+
+packages=("${linker[@]}" "${window[@]}" xvfb xdotool imagemagick)
+# The independent check of quad meshes lies beside the repository, if at all.
+if [[ -f ../shared/check/check_quads.py ]] && ! python3 -c 'import numpy, scipy' 2>/dev/null; then
+    packages+=(python3 python3-numpy python3-scipy)
+fi
+need "${packages[@]}"
+
+# Licences are checked where the tool for it is installed.
+if cargo deny --version >/dev/null 2>&1; then
+    cargo deny --offline check licenses || cargo deny check licenses
+fi
+cargo test --workspace "$@"

@@ -70,12 +70,11 @@ place() {
 open creature
 point 500 470
 picture hover
-xdotool click 5
-picture alternative
-xdotool click 4
-settle
 xdotool click 1
 settle
+point 420 430
+xdotool click 5
+picture alternative
 place 700 445
 picture red
 xdotool mousemove 20 800 key s

@@ -174,7 +174,7 @@ impl Plain {
                 self.entries.push((name, folder));
             }
         }
-        self.entries.sort_by(|a, b| (!a.1, a.0.to_lowercase()).cmp(&(!b.1, b.0.to_lowercase())));
+        self.entries.sort_by_key(|(name, folder)| (!folder, name.to_lowercase()));
     }
 
     fn enter(&mut self, folder: PathBuf) {

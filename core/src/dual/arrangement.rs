@@ -160,7 +160,7 @@ pub struct Arrangement {
 }
 
 impl Arrangement {
-    /// Arranges `curves` on `base`.
+    /// Arranges `curves` on `base`. Every segment and every stretch of boundary has an inner vertex.
     ///
     /// # Errors
     ///
@@ -169,16 +169,28 @@ impl Arrangement {
         base: &TriMesh,
         curves: impl IntoIterator<Item = &'c SurfaceCurve>,
     ) -> Result<Self, ArrangementError> {
+        let this = Self::sketch(base, curves)?;
+        match this.with_inner_vertices() {
+            Some(refined) => Self::read(refined, base.n_vertices()),
+            None => Ok(this),
+        }
+    }
+
+    /// As [`Self::new`], but a segment or stretch may be a single edge: enough to assess, not to embed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn sketch<'c>(
+        base: &TriMesh,
+        curves: impl IntoIterator<Item = &'c SurfaceCurve>,
+    ) -> Result<Self, ArrangementError> {
         let mut inserter = CurveInserter::new(base);
         for (i, curve) in curves.into_iter().enumerate() {
             curve.check(base).map_err(|source| ArrangementError::Curve { curve: i, source })?;
             inserter.insert(curve, i as u32).map_err(|source| ArrangementError::Draw { curve: i, source })?;
         }
-        let this = Self::read(inserter.refined, base.n_vertices())?;
-        match this.with_inner_vertices() {
-            Some(refined) => Self::read(refined, base.n_vertices()),
-            None => Ok(this),
-        }
+        Self::read(inserter.refined, base.n_vertices())
     }
 
     /// The refined mesh with the segments and boundary stretches split that are single edges, if there are

@@ -110,18 +110,29 @@ pub struct RegionReport {
     pub corners: Vec<(VertexId, i8)>,
 }
 
-/// Assesses every region of `arrangement` on `base`, whose pronounced corners are `corners` (vertex, index
-/// in quarters).
-pub fn assess(arrangement: &Arrangement, base: &TriMesh, corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
+/// What each vertex of `mesh` adds to the curvature of its region, in radians: its angle defect, or the turning
+/// of the boundary.
+pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
+    let one = |v| {
+        let angle: f64 = mesh.outgoing(v).map(|h| mesh.corner_angle(h)).sum();
+        let flat = if mesh.is_boundary_vertex(v) { PI } else { 2.0 * PI };
+        flat - angle
+    };
+    mesh.vertices().map(one).collect()
+}
+
+/// Assesses every region of `arrangement`.
+///
+/// `curvatures` are those of [`vertex_curvatures`] of the mesh before refinement, `corners` its pronounced
+/// corners (vertex, index in quarters).
+pub fn assess(arrangement: &Arrangement, curvatures: &[f64], corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
     let region_of_vertex = |v: VertexId| {
-        let h = arrangement.refined.outgoing(v.0)[0];
+        let h = arrangement.refined.any_outgoing(v.0);
         arrangement.region_left_of(h) as usize
     };
     let mut curvature = vec![0.0; arrangement.regions.len()];
-    for v in base.vertices() {
-        let angle: f64 = base.outgoing(v).map(|h| base.corner_angle(h)).sum();
-        let flat = if base.is_boundary_vertex(v) { PI } else { 2.0 * PI };
-        curvature[region_of_vertex(v)] += flat - angle;
+    for (v, k) in curvatures.iter().enumerate() {
+        curvature[region_of_vertex(VertexId::new(v))] += k;
     }
     let mut inside: Vec<Vec<(VertexId, i8)>> = vec![Vec::new(); arrangement.regions.len()];
     for &(v, index) in corners {

@@ -9,6 +9,6 @@ mod refined;
 mod slots;
 
 pub use arrangement::{Arrangement, ArrangementError, Crossing, End, Region, Segment, Side, SideKind};
-pub use assess::{Colour, Finding, RegionReport, assess};
+pub use assess::{Colour, Finding, RegionReport, assess, vertex_curvatures};
 pub(crate) use refined::Cost;
 pub use refined::{Mark, NoRoute, RefinedMesh, next, prev};

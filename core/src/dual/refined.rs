@@ -140,6 +140,12 @@ impl RefinedMesh {
         self.twin[h as usize] == NONE
     }
 
+    /// An outgoing half-edge of `v`.
+    #[inline]
+    pub fn any_outgoing(&self, v: u32) -> u32 {
+        self.vertex_halfedge[v as usize]
+    }
+
     /// The outgoing half-edges of `v`, counter-clockwise; at the boundary beginning with the boundary one.
     pub fn outgoing(&self, v: u32) -> Vec<u32> {
         let start = self.vertex_halfedge[v as usize];

@@ -139,7 +139,7 @@ fn grid_ids(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dual::{Arrangement, Colour, assess};
+    use crate::dual::{Arrangement, Colour, assess, vertex_curvatures};
     use crate::layout::{embed, map_patches};
     use crate::mesh::TriMesh;
     use crate::progress::Progress;
@@ -148,7 +148,7 @@ mod tests {
 
     fn quads(mesh: &TriMesh, curves: &[SurfaceCurve], target: f64) -> (QuadLayout, QuadMesh) {
         let arrangement = Arrangement::new(mesh, curves).unwrap();
-        let reports = assess(&arrangement, mesh, &[]);
+        let reports = assess(&arrangement, &vertex_curvatures(mesh), &[]);
         assert!(reports.iter().all(|r| r.colour != Colour::Red), "{reports:?}");
         let layout = QuadLayout::dual(&arrangement, &[], mesh.euler_characteristic()).unwrap();
         let progress = Progress::new();

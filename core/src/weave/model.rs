@@ -6,6 +6,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::session::WeaveError;
+use crate::dual::vertex_curvatures;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
 use crate::field::{Guides, Metric, pronounced, shape_field};
 use crate::mesh::{
@@ -48,6 +49,8 @@ pub struct Model {
     pub sharp: Vec<bool>,
     /// Principal curvatures at the vertices.
     pub curvature: Vec<PrincipalCurvature>,
+    /// What each vertex adds to the curvature of its region.
+    pub vertex_curvatures: Vec<f64>,
     /// The elastica graph.
     pub graph: ElasticaGraph,
     /// Points by ray or nearness.
@@ -80,7 +83,8 @@ impl Model {
         let elastica = ElasticaOptions { aligned_boundary: options.aligned_boundary, ..Default::default() };
         let graph = ElasticaGraph::build(mesh.clone(), &curvature, &sharp, &elastica, progress)?;
         progress.report("Ready", 1.0);
-        Ok(Self { loaded, mesh, options, topology, sharp, curvature, graph, index, corners })
+        let vertex_curvatures = vertex_curvatures(&mesh);
+        Ok(Self { loaded, mesh, options, topology, sharp, curvature, vertex_curvatures, graph, index, corners })
     }
 }
 

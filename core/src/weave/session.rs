@@ -252,7 +252,7 @@ impl Session {
     /// What the surface would look like with `proposal` added; for suggestions.
     pub(super) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
         let placed = self.design.strips.iter().map(|s| &s.curve);
-        Arrangement::new(&self.model.mesh, placed.chain([curve]))
+        Arrangement::sketch(&self.model.mesh, placed.chain([curve]))
     }
 }
 

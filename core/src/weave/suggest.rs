@@ -183,7 +183,7 @@ impl Session {
             .map(|c| {
                 progress.check()?;
                 let Ok(arrangement) = self.arranged_with(&c.curve) else { return Ok(None) };
-                let reports = assess(&arrangement, &model.mesh, &model.corners);
+                let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
                 let gain = before - deficit(&reports, goal);
                 Ok((gain > 1e-9).then(|| c.cost / gain))
             })

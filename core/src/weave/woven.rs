@@ -40,7 +40,7 @@ impl Woven {
     pub fn new(model: &Model, strips: &[Strip], progress: &Progress) -> Result<Self, WeaveError> {
         let arrangement = Arrangement::new(&model.mesh, strips.iter().map(|s| &s.curve))?;
         progress.check()?;
-        let reports = assess(&arrangement, &model.mesh, &model.corners);
+        let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let mesh = arrangement.refined.to_mesh().map_err(ArrangementError::from)?;
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
         let mut mask = DirectionMask::none();

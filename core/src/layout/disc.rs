@@ -2,6 +2,10 @@
 //!
 //! With positive weights and the border on a convex curve the map is one to one. The weights are cotangents,
 //! kept positive and of bounded ratio, so that slivers cannot spoil the system.
+//!
+//! A harmonic map shrinks limbs to almost nothing. Dividing the weights by the stretch at both their ends and
+//! mapping again gives them room, and the map stays one to one (Yoshizawa, Belyaev, Seidel: A fast and simple
+//! stretch-minimizing mesh parameterization, 2004).
 
 use glam::DVec2;
 
@@ -12,19 +16,75 @@ use crate::solve::{SolveError, SparseHermitian, SpdFactor};
 /// positive, and a ratio of 1000 is harmless to the solver.
 const WEIGHTS: (f64, f64) = (0.01, 10.0);
 
-/// Positions in the plane of all vertices of `mesh`, harmonic where `fixed` is `None`.
+/// Rounds of making the stretch less at most; most discs need two or three.
+const ROUNDS: usize = 8;
+/// By what factor a round must make the stretch less for another to follow.
+const LESS: f64 = 0.9;
+/// Bounds of the factor by which one round changes a weight at one end.
+const FACTOR: (f64, f64) = (1e-2, 1e2);
+
+/// A one-to-one map of little stretch, with `fixed` vertices where they are told to be: harmonic at first, then
+/// again with weights divided by the stretch, for as long as that makes the stretch less.
 ///
 /// # Errors
 ///
 /// When the linear system cannot be solved (no vertex of some component is fixed).
-pub(crate) fn harmonic(mesh: &TriMesh, fixed: &[Option<DVec2>]) -> Result<Vec<DVec2>, SolveError> {
-    let weights: Vec<f64> = mesh.edges().map(|e| weight(mesh, mesh.halfedge(e))).collect();
-    solve(mesh, fixed, &weights)
+pub(crate) fn relaxed(mesh: &TriMesh, fixed: &[Option<DVec2>]) -> Result<Vec<DVec2>, SolveError> {
+    let mut weights: Vec<f64> = mesh.edges().map(|e| weight(mesh, mesh.halfedge(e))).collect();
+    let mut map = solve(mesh, fixed, &weights)?;
+    if flipped(mesh, &map) > 0 {
+        // Equal weights are coarser in shape, but untouched by bad triangles.
+        weights.fill(1.0);
+        map = solve(mesh, fixed, &weights)?;
+    }
+    let mut least = f64::INFINITY;
+    let mut best = map.clone();
+    for _ in 0..=ROUNDS {
+        let (stretch, at) = stretch(mesh, &map);
+        if stretch.is_nan() || stretch >= LESS * least {
+            break;
+        }
+        (least, best) = (stretch, map);
+        for e in mesh.edges() {
+            let [a, b] = mesh.edge_vertices(e);
+            weights[e.index()] /= at[a.index()] * at[b.index()];
+        }
+        match solve(mesh, fixed, &weights) {
+            Ok(next) if flipped(mesh, &next) == 0 => map = next,
+            // Rounding has the better of it: the last map stands.
+            _ => break,
+        }
+    }
+    Ok(best)
 }
 
-/// As [`harmonic`] with equal weights: coarser in shape, but untouched by bad triangles.
-pub(crate) fn barycentric(mesh: &TriMesh, fixed: &[Option<DVec2>]) -> Result<Vec<DVec2>, SolveError> {
-    solve(mesh, fixed, &vec![1.0; mesh.n_edges()])
+/// The stretch of a map from the plane to the surface, of the whole and at every vertex relative to the mean.
+///
+/// At a vertex it is the root of the ratio of areas of two rings of triangles, on the surface and in the plane:
+/// unlike the stretch of single triangles, one sliver cannot dominate it.
+fn stretch(mesh: &TriMesh, map: &[DVec2]) -> (f64, Vec<f64>) {
+    let mut areas = vec![(0.0, 0.0); mesh.n_vertices()];
+    for f in mesh.faces() {
+        let corners = mesh.face_vertices(f);
+        let [a, b, c] = corners.map(|v| map[v.index()]);
+        let flat = 0.5 * (b - a).perp_dot(c - a).max(0.0);
+        for v in corners {
+            let at = &mut areas[v.index()];
+            *at = (at.0 + mesh.face_area(f), at.1 + flat);
+        }
+    }
+    let mut wider = areas.clone();
+    for e in mesh.edges() {
+        let [a, b] = mesh.edge_vertices(e).map(|v| v.index());
+        for (to, from) in [(a, b), (b, a)] {
+            wider[to] = (wider[to].0 + areas[from].0, wider[to].1 + areas[from].1);
+        }
+    }
+    let areas = wider;
+    let squared: Vec<f64> = areas.iter().map(|(area, flat)| area / flat.max(f64::MIN_POSITIVE)).collect();
+    let total: f64 = areas.iter().zip(&squared).map(|(a, s)| a.0 * s).sum();
+    let mean = total / areas.iter().map(|a| a.0).sum::<f64>();
+    (total, squared.into_iter().map(|s| (s / mean).sqrt().clamp(FACTOR.0, FACTOR.1)).collect())
 }
 
 fn weight(mesh: &TriMesh, h: crate::mesh::HalfedgeId) -> f64 {

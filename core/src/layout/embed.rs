@@ -1,9 +1,9 @@
 //! A first embedding of a layout: nodes as vertices, arcs as edge paths (Campen, section 7.8 d).
 //!
-//! Every region is a disc. It is mapped harmonically onto a round disc, one equal sector per side, and its
+//! Every region is a disc. It is mapped with little stretch onto a round disc, one equal sector per side, and its
 //! node is joined by straight lines to the middle of every side; the two halves that meet in the middle of a
 //! segment are its arc. Straight lines from one point do not meet, so arcs are disjoint by construction, and
-//! a harmonic map makes them fair curves on the surface. A node of a region at the boundary lies on the
+//! the map makes them fair curves on the surface. A node of a region at the boundary lies on the
 //! boundary, and the arcs of the segments that end there run along it.
 
 use std::collections::BinaryHeap;
@@ -219,8 +219,7 @@ fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveErro
             fixed[v as usize] = Some(DVec2::from_angle(std::f64::consts::TAU * turn));
         }
     }
-    let map = disc::harmonic(disc, &fixed)?;
-    if disc::flipped(disc, &map) == 0 { Ok(map) } else { disc::barycentric(disc, &fixed) }
+    disc::relaxed(disc, &fixed)
 }
 
 /// Length along a vertex path up to each of its vertices.

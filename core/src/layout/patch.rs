@@ -1,6 +1,6 @@
 //! Maps of all patches to rectangles.
 //!
-//! Every patch is cut out along its arcs and mapped harmonically, its four sides to the sides of a rectangle
+//! Every patch is cut out along its arcs and mapped with little stretch, its four sides to the sides of a rectangle
 //! by arc length. The width of a rectangle is the mean length of the arcs of its chord, so that opposite
 //! sides, and with them all patches of a dual strip, agree.
 
@@ -143,10 +143,7 @@ fn map_patch(
     }
     let fixed = rectangle_border(&mesh, &sides, size);
     let solve_error = |source| PatchError::Solve { patch: p, source };
-    let mut uv = disc::harmonic(&mesh, &fixed).map_err(solve_error)?;
-    if disc::flipped(&mesh, &uv) > 0 {
-        uv = disc::barycentric(&mesh, &fixed).map_err(solve_error)?;
-    }
+    let uv = disc::relaxed(&mesh, &fixed).map_err(solve_error)?;
     let flipped = disc::flipped(&mesh, &uv);
     let base_face = (0..refined.n_faces() as u32)
         .map(|f| embedding.base_face[faces[refined.base_face(f) as usize] as usize])

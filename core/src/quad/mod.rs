@@ -1,7 +1,10 @@
 //! Quad meshes: refining a layout, smoothing on the surface, quality.
 
-mod project;
+mod ground;
+mod optimise;
+mod rail;
 mod refine;
+mod shape;
 mod smooth;
 
 pub use refine::{QuadMesh, chord_counts, refine};

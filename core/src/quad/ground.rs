@@ -1,4 +1,4 @@
-//! Following a moving point on the surface.
+//! The surface under a quad mesh: following a moving point, smooth normals.
 //!
 //! The nearest point of the whole surface may lie on the far side of a thin wall. A vertex that moves in small
 //! steps is instead followed from triangle to triangle, each nearer to it than the one before.
@@ -10,8 +10,37 @@ use crate::mesh::{FaceId, TriMesh};
 /// Triangles passed in one step at most; a step is about a quad long, and quads span a few triangles.
 const MAX_WALK: usize = 64;
 
+/// The surface and its normals at vertices, weighted by angle.
+pub(super) struct Ground<'a> {
+    mesh: &'a TriMesh,
+    normals: Vec<DVec3>,
+}
+
+impl<'a> Ground<'a> {
+    pub(super) fn new(mesh: &'a TriMesh) -> Self {
+        let normal =
+            |v| -> DVec3 { mesh.outgoing(v).map(|h| mesh.face_normal(mesh.face(h)) * mesh.corner_angle(h)).sum() };
+        Self { mesh, normals: mesh.vertices().map(|v| normal(v).normalize_or_zero()).collect() }
+    }
+
+    /// The normal at a point of triangle `f`, interpolated from its corners.
+    pub(super) fn normal(&self, p: DVec3, f: u32) -> DVec3 {
+        let corners = self.mesh.face_vertices(FaceId(f));
+        let [a, b, c] = corners.map(|v| self.mesh.position(v));
+        let whole = self.mesh.face_area_vector(FaceId(f));
+        let w = [(b - p).cross(c - p), (c - p).cross(a - p), (a - p).cross(b - p)].map(|x| x.dot(whole).max(0.0));
+        let sum: DVec3 = corners.iter().zip(w).map(|(v, w)| self.normals[v.index()] * w).sum();
+        sum.normalize_or(self.mesh.face_normal(FaceId(f)).normalize_or(DVec3::Z))
+    }
+
+    /// The locally nearest point of the surface to `p`, found by walking from triangle `start`.
+    pub(super) fn follow(&self, p: DVec3, start: u32) -> (DVec3, u32) {
+        follow(self.mesh, p, start)
+    }
+}
+
 /// The locally nearest point of the surface to `p`, found by walking from triangle `start`.
-pub(super) fn follow(mesh: &TriMesh, p: DVec3, start: u32) -> (DVec3, u32) {
+fn follow(mesh: &TriMesh, p: DVec3, start: u32) -> (DVec3, u32) {
     let mut face = FaceId(start);
     let mut at = closest_in(mesh, face, p);
     let mut distance = at.distance_squared(p);

@@ -107,3 +107,117 @@ fn a_torus_takes_two_loops_for_its_one_patch() {
     assert_eq!((woven.strips(), woven.patches()), (2, 1));
     assert!(woven.valences().is_empty());
 }
+
+/// A script on the torus, written to a file.
+fn torus_script(folder: &Path, steps: &str) -> PathBuf {
+    let path = folder.join("script.json");
+    std::fs::write(&path, format!(r#"{{"mesh": "torus", "steps": [{steps}]}}"#)).unwrap();
+    path
+}
+
+/// The two loops of the torus.
+const MERIDIAN: &str = r#"{"hover": [1.07, 0, 0]}, {"place": true}"#;
+const EQUATOR: &str = r#"{"hover": [0, 0, -1.07]}, {"place": true}"#;
+
+#[test]
+fn steps_are_taken_back_and_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = |name: &str, steps: &str| {
+        let out = folder.path().join(name);
+        let output = plait(&["weave", text(&torus_script(folder.path(), steps)), "--out", text(&out)]);
+        assert!(output.status.success(), "{name}: {}", errors(&output));
+        std::fs::read(out.join("design.plait")).unwrap()
+    };
+    let straight = design("straight", &format!("{MERIDIAN}, {EQUATOR}"));
+    let history = r#"{"undo": true}, {"redo": true}, {"delete": 0}, {"delete": 0}, {"undo": true}, {"undo": true}"#;
+    let around = design("around", &format!("{MERIDIAN}, {EQUATOR}, {history}"));
+    assert!(straight == around, "undo and redo have changed the design");
+    let replaced = design("replaced", &format!("{EQUATOR}, {MERIDIAN}, {{\"delete\": 1}}, {MERIDIAN}"));
+    assert!(straight != replaced, "the order of the strips is lost");
+}
+
+#[test]
+fn a_mistake_in_a_script_is_named_with_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for (steps, part) in [
+        (r#"{"browse": 1}"#.to_owned(), "step 1"),
+        (r#"{"place": true}"#.to_owned(), "step 1"),
+        (format!(r#"{MERIDIAN}, {{"delete": 1}}"#), "step 3"),
+        (format!(r#"{MERIDIAN}, {{"place": true}}"#), "step 3"),
+        (r#"{"hover": [1, 2]}"#.to_owned(), "not a weave script"),
+        (r#"{"jump": true}"#.to_owned(), "not a weave script"),
+    ] {
+        let output = plait(&["weave", text(&torus_script(folder.path(), &steps)), "--out", text(&out)]);
+        assert!(!output.status.success(), "{steps}");
+        assert!(errors(&output).contains(part), "{steps}: {}", errors(&output));
+    }
+}
+
+#[test]
+fn an_unfinished_layout_is_reported_and_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let output = plait(&["weave", text(&torus_script(folder.path(), MERIDIAN)), "--out", text(&out)]);
+    assert!(!output.status.success());
+    assert!(!errors(&output).is_empty());
+    let report = report(&out);
+    assert_eq!((&report["valid"], &report["layout"]), (&Value::Bool(false), &Value::Null));
+    assert!(report["colours"]["red"].as_u64().unwrap() > 0, "{report}");
+    assert!(report["problem"].as_str().is_some_and(|p| !p.is_empty()), "{report}");
+    assert!(out.join("design.plait").is_file() && !out.join("quads.obj").exists());
+}
+
+/// All files of a folder but the times in the report.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        files.insert(entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap());
+    }
+    let mut report = report(folder);
+    report.as_object_mut().unwrap().remove("seconds").unwrap();
+    files.insert("report.json".into(), report.to_string().into_bytes());
+    files
+}
+
+#[test]
+fn one_thread_and_two_write_the_same_bytes() {
+    for name in ["creature", "sleeve"] {
+        let [one, two, again] = [("one", "1"), ("two", "2"), ("again", "2")].map(|(folder, threads)| {
+            let out = tempfile::tempdir().unwrap();
+            let path = out.path().join(folder);
+            let arguments = ["weave", text(&script(name)), "--out", text(&path)];
+            let output = plait_with(&arguments, &[("RAYON_NUM_THREADS", threads)]);
+            assert!(output.status.success(), "{name}: {}", errors(&output));
+            files(&path)
+        });
+        assert!(one.len() >= 5, "{:?}", one.keys());
+        for (file, bytes) in &one {
+            assert!(two[file] == *bytes, "{name}: {file} differs between one thread and two");
+            assert!(again[file] == *bytes, "{name}: {file} differs between two runs");
+        }
+    }
+}
+
+#[test]
+fn a_saved_design_opens_to_the_same_layout() {
+    let woven = weave("rounded-cube").unwrap();
+    let design = woven.file("design.plait");
+    let again = tempfile::tempdir().unwrap();
+    let output = plait(&["weave", text(&design), "--out", text(again.path())]);
+    assert!(output.status.success(), "{}", errors(&output));
+    for name in ["design.plait", "layout.obj", "quads.obj", "patches.obj"] {
+        let [before, after] = [woven.folder.path(), again.path()].map(|f| std::fs::read(f.join(name)).unwrap());
+        assert!(before == after, "{name} has changed");
+    }
+    let picture = woven.file("picture.png");
+    let output = plait(&["render", text(&design), "--out", text(&picture), "--size", "320x240"]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let bare = woven.file("bare.png");
+    let output = plait(&["render", "rounded-cube", "--out", text(&bare), "--size", "320x240"]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let [picture, bare] = [picture, bare].map(|p| image::open(p).unwrap().to_rgb8());
+    let different = picture.pixels().zip(bare.pixels()).filter(|(a, b)| a != b).count();
+    assert!(different > 1000, "the picture of the design shows no layout ({different} pixels differ)");
+}

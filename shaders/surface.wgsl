@@ -99,8 +99,8 @@ fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0
 
     // Hemisphere, a key light over the viewer's left shoulder, a fill from the right, a rim from behind.
     let up = view.view_axes[1].xyz;
-    let hemisphere = mix(GROUND, SKY, 0.5 + 0.5 * dot(normal, up)) * 0.50;
-    let key = max(dot(normal, view_direction(-0.45, 0.65, 0.75)), 0.0) * 0.62;
+    let hemisphere = mix(GROUND, SKY, 0.5 + 0.5 * dot(normal, up)) * 0.44;
+    let key = max(dot(normal, view_direction(-0.45, 0.65, 0.75)), 0.0) * 0.68;
     let fill = max(dot(normal, view_direction(0.80, 0.05, 0.45)), 0.0) * 0.17;
     let facing = max(dot(normal, toward_eye), 0.0);
     let rim = pow(1.0 - facing, 3.5) * max(dot(normal, view_direction(0.35, 0.75, -0.35)) + 0.25, 0.0) * 0.30;

@@ -1,6 +1,17 @@
 //! `plait weave`: replays a script, or places suggestions, and writes the layout.
 
-use super::WeaveArguments;
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Context as _;
+use plait_core::progress::Progress;
+use plait_core::weave::{
+    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, WeaveError, replay, write_all,
+};
+
+use super::{Until, WeaveArguments};
 
 /// Weaves and writes into the folder.
 ///
@@ -8,5 +19,78 @@ use super::WeaveArguments;
 ///
 /// When the input cannot be read, the layout is not valid in the end, or a file cannot be written.
 pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
-    anyhow::bail!("not built yet: weave {} into {}", arguments.input.display(), arguments.out.display())
+    let progress = Progress::new();
+    let start = Instant::now();
+    let mut session = open(&arguments.input, arguments.suggest, &progress)?;
+    let opened = start.elapsed().as_secs_f64();
+    if arguments.suggest {
+        let goal = match arguments.until {
+            Until::Red => Goal::Valid,
+            Until::Orange => Goal::Separated,
+        };
+        if let Some(stuck) = session.weave_to(goal, &progress)? {
+            say(&format!("plait: stopped early: {stuck}"));
+        }
+    }
+    let woven = start.elapsed().as_secs_f64();
+    let seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
+    let size = match (arguments.edge_length, arguments.quads) {
+        (Some(length), _) if length.is_finite() && length > 0.0 => QuadSize::EdgeLength(length),
+        (Some(length), _) => anyhow::bail!("the edge length must be positive, not {length}"),
+        (None, Some(n)) => QuadSize::Count(u32::try_from(n).context("that many quads do not fit into memory")?),
+        (None, None) => ExportOptions::default().size,
+    };
+    let export = write_all(&session, &ExportOptions { size }, &arguments.out, seconds, &progress)?
+        .map_err(|error| explain(&session, error))?;
+    say(&format!(
+        "{}: {} strips, {} patches, {} nodes ({} irregular), {} quads, {:.1} s",
+        session.model().loaded.name,
+        session.design().strips.len(),
+        export.layout.patches.len(),
+        export.layout.nodes.len(),
+        export.layout.n_irregular(),
+        export.quads.quads.len(),
+        start.elapsed().as_secs_f64(),
+    ));
+    Ok(())
+}
+
+/// A session on a script replayed, a saved design, or (to place suggestions on) a bare mesh.
+fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::Result<Session> {
+    let folder = input.parent().unwrap_or(Path::new(""));
+    let is = |extension: &str| input.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    if is("json") {
+        return Ok(replay(&Script::read(input)?, folder, progress)?);
+    }
+    if is("plait") {
+        let design = Design::read(input)?;
+        let loaded = design.mesh.load(folder)?;
+        return Ok(Session::resume(loaded, design, progress)?);
+    }
+    if !suggest {
+        anyhow::bail!("{} is no weave script (.json) or design (.plait); a mesh needs --suggest", input.display());
+    }
+    let source = MeshSource::from_name(&input.to_string_lossy());
+    let loaded = source.load(Path::new("")).with_context(|| input.display().to_string())?;
+    let source = match source {
+        MeshSource::File(path) => MeshSource::File(path.canonicalize().unwrap_or(path)),
+        builtin @ MeshSource::Builtin(_) => builtin,
+    };
+    Ok(Session::open(loaded, source, Options::default(), progress)?)
+}
+
+/// Why there is no layout, region by region where that is the reason.
+fn explain(session: &Session, error: WeaveError) -> anyhow::Error {
+    let mut text = format!("no layout was written: {error}");
+    for region in session.woven().red() {
+        let report = &session.woven().reports[region as usize];
+        let reasons: Vec<String> = report.findings.iter().map(ToString::to_string).collect();
+        text += &format!("\n  region {region}: {}", reasons.join("; "));
+    }
+    anyhow::anyhow!(text)
+}
+
+/// Writes a line for the user; what the program makes goes to files.
+fn say(line: &str) {
+    drop(writeln!(std::io::stderr(), "{line}"));
 }

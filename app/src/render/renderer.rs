@@ -117,7 +117,7 @@ impl Renderer {
             Instances::write(old, device, queue, &surface.vertices)
         });
         upload(&mut self.lines, &frame.scene.lines, |old, lines| {
-            let segments: Vec<_> = lines.iter().flat_map(|l| segments(l)).collect();
+            let segments: Vec<_> = lines.iter().flat_map(segments).collect();
             Instances::write(old, device, queue, &segments)
         });
         upload(&mut self.markers, &frame.scene.markers, |old, markers| {

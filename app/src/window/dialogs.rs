@@ -80,6 +80,11 @@ impl Dialogs {
         }
     }
 
+    /// Whether a dialog of our own holds the keyboard.
+    pub fn is_open(&self) -> bool {
+        self.plain.is_some()
+    }
+
     fn file_name(&self, asked: Asked) -> String {
         let stem = Path::new(&self.suggested_name).file_stem().map(|s| s.to_string_lossy().to_lowercase());
         let stem = stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "design".into());
@@ -134,12 +139,15 @@ struct Plain {
     name: String,
     entries: Vec<(String, bool)>,
     trouble: Option<String>,
+    /// Whether the name line already got the keyboard.
+    focused: bool,
 }
 
 impl Plain {
     fn new(asked: Asked, name: &str) -> Self {
         let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("/"));
-        let mut plain = Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None };
+        let mut plain =
+            Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None, focused: false };
         plain.list();
         plain
     }
@@ -166,11 +174,12 @@ impl Plain {
                 self.entries.push((name, folder));
             }
         }
-        self.entries.sort_by(|a, b| (!a.1, a.0.to_lowercase()).cmp(&(!b.1, b.0.to_lowercase())));
+        self.entries.sort_by_key(|(name, folder)| (!folder, name.to_lowercase()));
     }
 
     fn enter(&mut self, folder: PathBuf) {
         self.folder = folder;
+        self.focused = false;
         self.list();
     }
 
@@ -192,7 +201,8 @@ impl Plain {
     /// `Some(Some(path))` when chosen, `Some(None)` when cancelled.
     fn show(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
         let mut result = None;
-        let response = egui::Modal::new(egui::Id::unique("file dialog")).show(ctx, |ui| {
+        let frame = egui::Frame::window(&ctx.global_style()).inner_margin(18.0);
+        let response = egui::Modal::new(egui::Id::unique("file dialog")).frame(frame).show(ctx, |ui| {
             ui.set_width(520.0);
             ui.heading(self.asked.title());
             ui.horizontal(|ui| {
@@ -211,6 +221,10 @@ impl Plain {
                     ui.add(egui::TextEdit::singleline(&mut self.name).desired_width(width)).labelled_by(label.id);
                 if line.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
                     result = self.accept().map(Some);
+                    self.focused = false;
+                }
+                if !std::mem::replace(&mut self.focused, true) {
+                    line.request_focus();
                 }
             });
             if let Some(trouble) = &self.trouble {

@@ -66,6 +66,7 @@ pub struct PlaitApp {
     frame_pending: bool,
     shortcuts_open: bool,
     about_open: bool,
+    title: String,
 }
 
 impl PlaitApp {
@@ -107,6 +108,7 @@ impl PlaitApp {
             frame_pending: false,
             shortcuts_open: false,
             about_open: false,
+            title: String::new(),
         })
     }
 
@@ -281,6 +283,14 @@ impl PlaitApp {
         }
     }
 
+    fn show_title(&mut self, ctx: &egui::Context) {
+        let title = self.scene.as_ref().map_or_else(|| "Plait".into(), |s| format!("Plait – {}", s.model.name));
+        if self.title != title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+
     fn take_dropped_files(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|i| i.raw.dropped_files.first().map(|f| f.path().to_path_buf()));
         if let Some(path) = dropped {
@@ -303,6 +313,7 @@ impl eframe::App for PlaitApp {
         for action in actions {
             self.act(action, &ctx);
         }
+        self.show_title(&ctx);
         if self.worker.running().is_some_and(|r| !r.yields) {
             ctx.request_repaint_after(PROGRESS_TICK);
         }

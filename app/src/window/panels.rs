@@ -57,7 +57,10 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
 /// The actions of the keys pressed, unless text is being edited.
 pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
     let mut actions = Vec::new();
-    let typing = ctx.egui_wants_keyboard_input();
+    if app.dialogs.is_open() {
+        return actions;
+    }
+    let typing = ctx.text_edit_focused();
     ctx.input_mut(|i| {
         // The longer combination first, or the shorter one would take it.
         for (shortcut, action) in [
@@ -69,7 +72,9 @@ pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
             (EXPORT, Action::AskExport),
             (QUIT, Action::Quit),
         ] {
-            if i.consume_shortcut(&shortcut) {
+            // A text field has a history of its own.
+            let of_text = typing && matches!(action, Action::Undo | Action::Redo);
+            if !of_text && i.consume_shortcut(&shortcut) {
                 actions.push(action);
             }
         }
@@ -130,11 +135,15 @@ pub fn show(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 fn top_bar(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
-    ui.horizontal(|ui| {
+    egui::MenuBar::new().ui(ui, |ui| {
         ui.label(RichText::new("Plait").size(18.0).color(theme::ACCENT));
         ui.add_space(6.0);
-        egui::MenuBar::new().ui(ui, |ui| menus(app, ui, actions));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| quick_buttons(app, ui, actions));
+        menus(app, ui, actions);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            // Buttons, not menus: framed.
+            ui.set_style(ui.ctx().global_style());
+            quick_buttons(app, ui, actions);
+        });
     });
 }
 

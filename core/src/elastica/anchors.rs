@@ -1,10 +1,17 @@
 //! Loops through several anchors, in order, each with or without a direction (Campen, chapter 8).
 //!
 //! A search state gains the leg it is on: leg `i` leads from anchor `i` to the next, and ends with the first state
-//! that leaves the next anchor. A field over all legs, backwards from the start anchor, holds the exact cheapest way
-//! to finish the round in any direction at the start. With it as potential, an A* search per start direction closes
-//! the loop with that direction. The field grows only as far as the best loop known costs, so the work follows the
-//! cost of the answer. The start is the anchor with the fewest directions: with a single one, one A* search is all.
+//! that leaves the next anchor.
+//!
+//! 1. *Legs*: the cheapest way over each leg alone, in any direction allowed at its ends, from both ends at once.
+//!    Their sum is a lower bound of the round.
+//! 2. *Rounds*: for a limit a bit above it, a field over all legs, backwards from the start anchor, holds the exact
+//!    cheapest way to finish the round, in any direction at the start. What the legs before cost at least keeps it
+//!    in the corridor of rounds below the limit.
+//! 3. With it as potential, an A* search per start direction closes the loop with that direction. If the best
+//!    loop is not below the limit, the limit grows.
+//!
+//! The start is the anchor with the fewest directions. If all anchors have one, step 1 already knows the cost.
 
 use glam::DVec3;
 
@@ -12,11 +19,14 @@ use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::proposals::Proposals;
-use super::search::{Field, Meter, Route, SearchWorkspace, Stop};
+use super::search::{Field, Meter, ROUNDING, Route, SearchWorkspace, Stop};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
-/// How much farther the field grows when no loop was found within its radius.
+/// First limit, relative to the lower bound; the rest is for turns at anchors without direction.
+const FIRST_LIMIT: f32 = 1.1;
+
+/// How much the limit grows when no loop was found below it.
 const GROWTH: f32 = 1.3;
 
 /// A place a loop has to pass, and the direction it has to pass it in, if any.
@@ -82,10 +92,15 @@ struct Round<'a> {
     mask: &'a DirectionMask,
     /// States that may leave each anchor.
     gates: Vec<Vec<State>>,
-    /// Per leg: distances backwards, on reversed states.
-    home: &'a mut Vec<Field>,
+    /// Per leg: its lower bound.
+    bounds: Vec<f32>,
+    /// Per leg: distances from its start, final up to a radius.
+    out: &'a mut [Field],
+    radii: Vec<f32>,
+    /// Per leg: distances backwards over all legs to come, on reversed states.
+    home: &'a mut [Field],
     /// Per leg: distances of the A* search.
-    ahead: &'a mut Vec<Field>,
+    ahead: &'a mut [Field],
     /// Per state of the start gate: cheapest round from it.
     rounds: Vec<f32>,
     open: Option<Route>,
@@ -106,95 +121,143 @@ impl<'a> Round<'a> {
         if gates[start].is_empty() {
             return None;
         }
-        let SearchWorkspace { home, ahead, boundary, .. } = work;
-        for legs in [&mut *home, &mut *ahead] {
-            legs.resize_with(gates.len().max(legs.len()), Field::default);
+        let SearchWorkspace { out, home, ahead, boundary, .. } = work;
+        let n = gates.len();
+        for legs in [&mut *out, &mut *home, &mut *ahead] {
+            legs.resize_with(n.max(legs.len()), Field::default);
         }
         let open = boundary.as_ref().map(|b| Passage { graph, mask, gates: &gates, boundary: b });
-        let open = open.and_then(|p| p.cheapest(&mut ahead[..gates.len()]));
+        let open = open.and_then(|p| p.cheapest(&mut ahead[..n]));
         gates.rotate_left(start);
-        for leg in &mut home[..gates.len()] {
-            leg.restart(graph.n_states());
-        }
         let rounds = vec![f32::INFINITY; gates[0].len()];
-        Some(Self { graph, mask, gates, home, ahead, rounds, open })
-    }
-
-    fn legs(&self) -> usize {
-        self.gates.len()
+        let (out, home, ahead) = (&mut out[..n], &mut home[..n], &mut ahead[..n]);
+        let (bounds, radii) = (vec![0.0; n], vec![0.0; n]);
+        Some(Self { graph, mask, gates, bounds, out, radii, home, ahead, rounds, open })
     }
 
     fn solve(&mut self, meter: &mut Meter, best: &mut Option<Route>) -> Result<(), Stop> {
         best.clone_from(&self.open);
-        let last = self.legs() - 1;
-        for &b in &self.gates[0] {
-            let source = self.graph.reverse[b as usize];
-            self.home[last].set(source, 0.0, NO_STATE, 0);
-            self.home[last].push(0.0, source);
+        for leg in 0..self.gates.len() {
+            self.bounds[leg] = self.cross(leg, meter)?;
+        }
+        let least: f32 = self.bounds.iter().sum();
+        if !least.is_finite() {
+            return Ok(());
         }
         let cost = |best: &Option<Route>| best.as_ref().map_or(f32::INFINITY, |r| r.cost);
-        let mut radius = self.grow(None, meter)? * GROWTH;
-        while radius.is_finite() {
-            let radius_now = radius.min(cost(best));
-            self.grow(Some(radius_now), meter)?;
+        let directed = self.gates.iter().all(|g| g.len() == 1);
+        let mut limit = least * if directed { ROUNDING } else { FIRST_LIMIT };
+        while least < cost(best) {
+            let below = limit.min(cost(best));
+            let complete = self.finish(below, least, meter)?;
             let mut starts: Vec<usize> = (0..self.rounds.len()).collect();
             starts.sort_by(|&i, &j| self.rounds[i].total_cmp(&self.rounds[j]).then(i.cmp(&j)));
             for i in starts {
-                let limit = radius.min(cost(best));
-                if self.rounds[i] >= limit {
+                let below = limit.min(cost(best));
+                if self.rounds[i] >= below {
                     break;
                 }
-                if let Some(route) = self.close(self.gates[0][i], limit, meter)? {
+                if let Some(route) = self.close(self.gates[0][i], below, meter)? {
                     *best = Some(route);
                 }
             }
-            if cost(best) <= radius || earliest(&self.home[..=last]).is_none() {
+            if complete || cost(best) <= limit {
                 break;
             }
-            radius *= GROWTH;
+            limit *= GROWTH;
         }
         Ok(())
     }
 
-    /// Grows the fields over all legs to `radius`, or until the cheapest round is known; returns its cost.
-    fn grow(&mut self, radius: Option<f32>, meter: &mut Meter) -> Result<f32, Stop> {
+    /// The cheapest way over a leg, by a search from both ends; its near half stays in `out`.
+    fn cross(&mut self, leg: usize, meter: &mut Meter) -> Result<f32, Stop> {
         let graph = self.graph;
-        let n = self.legs();
-        loop {
-            let cheapest = self.rounds.iter().copied().fold(f32::INFINITY, f32::min);
-            let Some(leg) = earliest(&self.home[..n]) else { return Ok(cheapest) };
-            if self.home[leg].top() >= radius.unwrap_or(cheapest) {
-                return Ok(cheapest);
+        let (out, back) = (&mut self.out[leg], &mut self.ahead[leg]);
+        out.restart(graph.n_states());
+        back.restart(graph.n_states());
+        for &a in &self.gates[leg] {
+            out.set(a, 0.0, NO_STATE, 0);
+            out.push(0.0, a);
+        }
+        for &b in &self.gates[(leg + 1) % self.gates.len()] {
+            let source = graph.reverse[b as usize];
+            back.set(source, 0.0, NO_STATE, 0);
+            back.push(0.0, source);
+        }
+        let mut cost = f32::INFINITY;
+        while out.top() + back.top() < cost {
+            let outwards = out.top() <= back.top();
+            let (near, far) = if outwards { (&mut *out, &*back) } else { (&mut *back, &*out) };
+            expand(graph, self.mask, near, meter, |f, reached| {
+                cost = cost.min(reached + far.dist(graph.reverse[f as usize]));
+            })?;
+        }
+        // Whatever is not settled is at least as far as the queue.
+        self.radii[leg] = out.top();
+        Ok(cost)
+    }
+
+    /// Finds for each start direction the cheapest round below `limit`, which may come back in another direction.
+    /// Returns whether the limit left nothing out.
+    fn finish(&mut self, limit: f32, least: f32, meter: &mut Meter) -> Result<bool, Stop> {
+        let graph = self.graph;
+        let last = self.gates.len() - 1;
+        for leg in 0..=last {
+            let radius = 0.5 * (limit - (least - self.bounds[leg]));
+            while self.out[leg].top() < radius {
+                expand(graph, self.mask, &mut self.out[leg], meter, |_, _| {})?;
             }
-            let Some((d, y)) = self.home[leg].pop() else { return Ok(cheapest) };
+            self.radii[leg] = self.out[leg].top();
+            self.home[leg].restart(graph.n_states());
+        }
+        self.rounds.fill(f32::INFINITY);
+        let mut complete = true;
+        for &b in &self.gates[0] {
+            let source = graph.reverse[b as usize];
+            self.home[last].set(source, 0.0, NO_STATE, 0);
+            self.home[last].push(0.0, source);
+        }
+        while let Some(leg) = earliest(self.home) {
+            let Some((d, y)) = self.home[leg].pop() else { break };
             if !self.home[leg].settle(d, y) {
                 continue;
             }
             meter.tick()?;
             for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
                 let reached = d + graph.step(y, z);
-                if reached < self.home[leg].dist(z) {
-                    self.home[leg].set(z, reached, NO_STATE, 0);
-                    self.home[leg].push(reached, z);
-                }
+                complete &= self.reach(leg, z, reached, limit);
                 // `rev z` leaves the anchor this leg starts at: the leg before may end with it.
                 if let Some(i) = position(&self.gates[leg], graph.reverse[z as usize]) {
                     if leg == 0 {
                         self.rounds[i] = self.rounds[i].min(reached);
-                    } else if reached < self.home[leg - 1].dist(z) {
-                        self.home[leg - 1].set(z, reached, NO_STATE, 0);
-                        self.home[leg - 1].push(reached, z);
+                    } else {
+                        complete &= self.reach(leg - 1, z, reached, limit);
                     }
                 }
             }
         }
+        Ok(complete)
+    }
+
+    /// Notes that the round can be finished from `rev z` on `leg` for `reached`; false if that is beyond the limit.
+    fn reach(&mut self, leg: usize, z: State, reached: f32, limit: f32) -> bool {
+        let e = self.graph.reverse[z as usize];
+        let before: f32 = self.bounds[..leg].iter().sum::<f32>() + self.out[leg].settled(e).min(self.radii[leg]);
+        if reached + before >= limit {
+            return false;
+        }
+        if reached < self.home[leg].dist(z) {
+            self.home[leg].set(z, reached, NO_STATE, 0);
+            self.home[leg].push(reached, z);
+        }
+        true
     }
 
     /// The cheapest loop that leaves the start anchor by `x` and comes back into it, if it costs less than `limit`.
     fn close(&mut self, x: State, limit: f32, meter: &mut Meter) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
-        let n = self.legs();
-        let ahead = &mut self.ahead[..n];
+        let n = self.gates.len();
+        let ahead = &mut *self.ahead;
         ahead.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
         let (mut cost, mut end) = (limit, None);
         let (mut leg, mut e, mut d, mut parent) = (0, x, 0.0, NO_STATE);
@@ -228,6 +291,30 @@ impl<'a> Round<'a> {
         states.extend(chain(ahead, leg, last));
         Ok(Some(Route { cost, states, closed: true }))
     }
+}
+
+/// Settles the next state of a field and shows all its successors to `reach`.
+fn expand(
+    graph: &ElasticaGraph,
+    mask: &DirectionMask,
+    field: &mut Field,
+    meter: &mut Meter,
+    mut reach: impl FnMut(State, f32),
+) -> Result<(), Stop> {
+    let Some((d, e)) = field.pop() else { return Ok(()) };
+    if !field.settle(d, e) {
+        return Ok(());
+    }
+    meter.tick()?;
+    for f in graph.successors(e).filter(|&f| mask.is_open(f)) {
+        let reached = d + graph.step(e, f);
+        reach(f, reached);
+        if reached < field.dist(f) {
+            field.set(f, reached, e, 0);
+            field.push(reached, f);
+        }
+    }
+    Ok(())
 }
 
 /// The leg with the smallest key in its queue.

@@ -16,6 +16,9 @@ use crate::surface::SurfaceCurve;
 /// factor: then neither leaves out what the other goes round.
 const SAME_LENGTH: f64 = 1.3;
 
+/// Where the cheapest route shrinks to a point as a curve, the next ones up to this multiple of its cost are tried.
+const FALLBACK_FACTOR: f64 = 2.0;
+
 /// What loops are wanted.
 #[derive(Debug, Clone, Copy)]
 pub struct ProposalQuery<'a> {
@@ -126,7 +129,12 @@ impl ElasticaGraph {
             Err(Stop::Cancelled) => return Err(Cancelled),
         };
         let settled = search.meter.settled;
-        Ok(Proposals { loops: self.distinct(routes, query), proved, settled })
+        let any = !routes.is_empty();
+        let loops = self.distinct(routes, query);
+        if loops.is_empty() && any && query.direction.is_none() && query.factor < FALLBACK_FACTOR {
+            return self.proposals(&ProposalQuery { factor: FALLBACK_FACTOR, ..*query }, work, progress);
+        }
+        Ok(Proposals { loops, proved, settled })
     }
 
     /// The cheapest of `routes` that are curves and not copies of one another.

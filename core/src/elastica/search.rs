@@ -149,6 +149,7 @@ pub struct SearchWorkspace {
     pub(super) fans: Vec<Mutex<Fan>>,
     meets: Vec<(State, State)>,
     /// Per leg of a loop through anchors.
+    pub(super) out: Vec<Field>,
     pub(super) home: Vec<Field>,
     pub(super) ahead: Vec<Field>,
     pub(super) boundary: Option<BoundaryField>,

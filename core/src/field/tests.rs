@@ -101,3 +101,102 @@ fn a_crossing_itself_and_an_open_end_are_told_apart() {
     curves[edge_between(&mesh, 0, 1).index()] = None;
     assert!(matches!(trace_curves(&mesh, &Metric::new(&mesh), &curves), Err(FieldError::OpenCurve { curve: 3, .. })));
 }
+
+#[test]
+fn guides_turn_the_field() {
+    let mesh = torus(48, 12);
+    let metric = Metric::new(&mesh);
+    let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<glam::DVec3>() / 3.0;
+    let directions: Vec<_> = mesh
+        .faces()
+        .map(|f| {
+            let around = glam::DVec3::Z.cross(centre(f)).normalize();
+            // Waving about the parallels.
+            let slant = 0.4 * (4.0 * centre(f).y.atan2(centre(f).x)).sin();
+            glam::DQuat::from_axis_angle(mesh.face_normal(f), slant) * around
+        })
+        .collect();
+    let weights = vec![1.0; mesh.n_faces()];
+    for (radius, most) in [(0.01, true), (10.0, false)] {
+        let guides = Guides { directions: &directions, weights: &weights, radius };
+        let field = shape_field(&mesh, &metric, Some(guides), &[], &Progress::new()).unwrap();
+        let near = |f: &crate::mesh::FaceId| {
+            (0..4).any(|b| field.direction(&mesh, &metric, *f, b).dot(directions[f.index()]) > 0.99)
+        };
+        assert_eq!(mesh.faces().filter(near).count() * 10 > mesh.n_faces() * 9, most);
+        assert_eq!(sum(&field.singularities), 0);
+    }
+}
+
+#[test]
+fn sharp_edges_are_followed() {
+    let mesh = cells(&[[0, 0, 0]], 6);
+    let metric = Metric::new(&mesh);
+    let sharp: Vec<bool> = mesh
+        .edges()
+        .map(|e| {
+            let h = mesh.halfedge(e);
+            let n = [h, mesh.twin(h).unwrap()].map(|h| mesh.face_normal(mesh.face(h)));
+            n[0].dot(n[1]) < 0.5
+        })
+        .collect();
+    let field = shape_field(&mesh, &metric, None, &sharp, &Progress::new()).unwrap();
+    assert_eq!(field.singularities.len(), 8);
+    for e in mesh.edges().filter(|e| sharp[e.index()]) {
+        let h = mesh.halfedge(e);
+        let best = field.direction(&mesh, &metric, mesh.face(h), field.branch_along(&metric, h, 0.0));
+        assert!(best.dot(mesh.vector(h).normalize()) > 1.0 - 1e-9);
+    }
+    assert!(shape_field(&mesh, &metric, None, &sharp[1..], &Progress::new()).is_err());
+}
+
+#[test]
+fn a_zigzag_leans_away_from_its_edges() {
+    // Along a ring's circle, every second vertex moved in and out: edges tilt, the smoothed direction does not.
+    let flat = ring(60, 8);
+    let mut positions = flat.positions().to_vec();
+    for i in (0..60).step_by(2) {
+        let v = i * 9 + 4;
+        positions[v] *= 1.04;
+    }
+    let faces: Vec<[u32; 3]> = flat.faces().map(|f| flat.face_vertices(f).map(|v| v.0)).collect();
+    let mesh = TriMesh::from_faces(positions, &faces).unwrap();
+    let mut curves = vec![None; mesh.n_edges()];
+    for i in 0..60 {
+        curves[edge_between(&mesh, i * 9 + 4, (i + 1) % 60 * 9 + 4).index()] = Some(0);
+    }
+    let metric = Metric::new(&mesh);
+    let path = &trace_curves(&mesh, &metric, &curves).unwrap()[0];
+    for (s, lean) in path.steps.iter().zip(&path.lean) {
+        assert!(lean.abs() > 0.2);
+        let h = s.left(&mesh).unwrap();
+        let tangent = metric.tangent(&mesh, mesh.face(h), metric.direction(h) + lean);
+        let middle = (mesh.position(s.from(&mesh)) + mesh.position(s.to(&mesh))).normalize();
+        assert!(tangent.dot(middle).abs() < 0.12, "{}", tangent.dot(middle));
+    }
+}
+
+/// A real mesh, or a note that it is missing.
+fn real(name: &str) -> Option<TriMesh> {
+    let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
+        std::path::PathBuf::from,
+    );
+    let mesh = crate::mesh::load(&folder.join(name)).ok().map(|l| l.mesh);
+    if mesh.is_none() {
+        eprintln!("{name} not found, skipped");
+    }
+    mesh
+}
+
+#[test]
+fn real_shapes_have_tens_of_corners() {
+    for name in ["bunny_7k.off", "rockerarm_5k.obj"] {
+        let Some(mesh) = real(name) else { continue };
+        let field = shape(&mesh);
+        assert_eq!(sum(&field.singularities), 4 * mesh.euler_characteristic());
+        let kept = pronounced(&mesh, &field.singularities, 0.05);
+        assert_eq!(sum(&kept), 4 * mesh.euler_characteristic());
+        assert!((8..60).contains(&kept.len()), "{name}: {} of {}", kept.len(), field.singularities.len());
+    }
+}

@@ -12,8 +12,8 @@ use std::collections::BinaryHeap;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::Strip;
 use super::cut::Cut;
-use super::{Strip, StripMap};
 use crate::field::{CrossField, EdgePath, Metric, Step, pronounced};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
@@ -47,10 +47,18 @@ pub(super) struct Ground<'a> {
     pub mean_edge: f64,
 }
 
-/// Conquers for all `paths` and notes the results in `map`: of several strips the nearest covers a triangle.
-pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath], map: &mut StripMap) {
-    let mean = ground.mesh.faces().map(|f| ground.metric.area(f)).sum::<f64>() / ground.mesh.n_faces().max(1) as f64;
-    let mut closed = vec![false; ground.mesh.n_faces()];
+/// The strips, and what they cover as in [`super::StripMap`].
+pub(super) struct Conquered {
+    pub strips: Vec<Strip>,
+    pub covered: Vec<[Option<u32>; 2]>,
+    pub stripe: Vec<[[f32; 3]; 2]>,
+}
+
+/// Conquers for all `paths`; of several strips the nearest covers a triangle.
+pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath]) -> Conquered {
+    let n = ground.mesh.n_faces();
+    let mean = ground.mesh.faces().map(|f| ground.metric.area(f)).sum::<f64>() / n.max(1) as f64;
+    let mut closed = vec![false; n];
     for f in ground.mesh.faces() {
         closed[f.index()] = ground.flipped[f.index()] && ground.metric.area(f) > SLIVER * mean;
     }
@@ -59,19 +67,21 @@ pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath], map: &mut StripMa
         singular[s.vertex.index()] = true;
     }
     let results: Vec<_> = paths.par_iter().map(|p| conquer_one(ground, &closed, &singular, p)).collect();
-    let mut nearest = vec![[f64::INFINITY; 2]; ground.mesh.n_faces()];
+    let mut nearest = vec![[f64::INFINITY; 2]; n];
+    let mut out = Conquered { strips: Vec::new(), covered: vec![[None; 2]; n], stripe: vec![[[0.0; 3]; 2]; n] };
     for (i, (path, (bounds, taken))) in paths.iter().zip(results).enumerate() {
-        map.strips.push(Strip { curve: path.curve, bounds, faces: taken.len() });
+        out.strips.push(Strip { curve: path.curve, bounds, faces: taken.len() });
         for (f, family, d) in taken {
             let (f, family) = (f.index(), usize::from(family));
             let far = d.iter().sum::<f64>().abs();
             if far < nearest[f][family] {
                 nearest[f][family] = far;
-                map.covered[f][family] = Some(i as u32);
-                map.stripe[f][family] = d.map(|d| d as f32);
+                out.covered[f][family] = Some(i as u32);
+                out.stripe[f][family] = d.map(|d| d as f32);
             }
         }
     }
+    out
 }
 
 /// How the distance reads in a triangle: `d = Re(i^{-branch} w) + offset`.

@@ -9,6 +9,7 @@ mod map;
 #[cfg(test)]
 mod tests;
 
+use conquer::{Conquered, Ground};
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
@@ -102,20 +103,19 @@ impl StripMap {
         let uv = map::solve(mesh, metric, &field, &cut, paths, progress)?;
         progress.report("strips", 0.9);
         let flipped: Vec<bool> = uv.iter().map(|&[a, b, c]| (b - a).perp_dot(c - a) <= 0.0).collect();
-        let mut map = Self {
-            residual: residual(mesh, metric, &field, &cut, paths, &uv),
-            field,
-            uv,
-            flipped,
-            strips: Vec::new(),
-            covered: vec![[None; 2]; mesh.n_faces()],
-            stripe: vec![[[0.0; 3]; 2]; mesh.n_faces()],
-        };
-        let (field, uv, flipped) = (map.field.clone(), map.uv.clone(), map.flipped.clone());
+        let residual = residual(mesh, metric, &field, &cut, paths, &uv);
         let mean_edge = mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
-        let ground = conquer::Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped, mean_edge };
-        conquer::conquer(&ground, paths, &mut map);
-        Ok(map)
+        let ground = Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped, mean_edge };
+        let Conquered { strips, covered, stripe } = conquer::conquer(&ground, paths);
+        tracing::debug!(
+            faces = mesh.n_faces(),
+            strips = strips.len(),
+            singularities = field.singularities.len(),
+            flipped = flipped.iter().filter(|&&f| f).count(),
+            residual,
+            "strip map"
+        );
+        Ok(Self { field, uv, flipped, strips, covered, stripe, residual })
     }
 
     /// The unit tangent of the isolines of coordinate `axis` (0: u constant) in a triangle; zero where the map

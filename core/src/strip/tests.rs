@@ -87,6 +87,9 @@ fn stripes_are_continuous_and_zero_on_their_curve() {
                 if height.abs() < 1e-9 {
                     met += 1;
                     assert!(d.abs() < 1e-6);
+                    // Along the circle its isolines are parallel to its plane, up to the size of a triangle.
+                    let along = map.iso_direction(&mesh, f, family);
+                    assert!(along[map.strips[strip as usize].curve as usize].abs() < 0.3, "{along}");
                 } else {
                     // The sides of a strip are those of its plane.
                     assert!(f64::from(d).abs() > 1e-6);

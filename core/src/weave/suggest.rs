@@ -96,6 +96,22 @@ impl Session {
         Err(Stuck::NoHelp { region: first, reason }.into())
     }
 
+    /// Places suggestions until `goal` is reached; returns why not, if it is not.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn weave_to(&mut self, goal: Goal, progress: &Progress) -> Result<Option<Stuck>, WeaveError> {
+        loop {
+            match self.suggest(goal, progress) {
+                Ok(proposal) => self.place(proposal, progress)?,
+                Err(WeaveError::Stuck(Stuck::Done)) => return Ok(None),
+                Err(WeaveError::Stuck(stuck)) => return Ok(Some(stuck)),
+                Err(error) => return Err(error),
+            };
+        }
+    }
+
     /// A curve that was found by connectivity alone, relaxed.
     fn smoothed(&self, proposal: Proposal, progress: &Progress) -> Proposal {
         let options = RelaxOptions { tube: WIDE_TUBE, ..Default::default() };

@@ -66,10 +66,7 @@ fn weave(name: &str) -> Option<Woven> {
 
     let mesh = plait_core::mesh::load(&source).unwrap().mesh;
     let topology = plait_core::mesh::Topology::new(&mesh);
-    let expected = support::Shape {
-        euler: mesh.euler_characteristic(),
-        boundary_loops: topology.boundary_loops.len(),
-    };
+    let expected = support::Shape { euler: mesh.euler_characteristic(), boundary_loops: topology.boundary_loops.len() };
     let quads = read_faces(&folder.path().join("quads.obj"));
     assert!(quads.iter().all(|q| q.len() == 4), "{name}: not only quads");
     assert_eq!(quads.len() as u64, report["layout"]["quads"].as_u64().unwrap(), "{name}");
@@ -108,6 +105,68 @@ fn a_torus_takes_two_loops_for_its_one_patch() {
     assert!(woven.valences().is_empty());
 }
 
+/// Weaves and asserts that there are no more patches than `patches`, and that the valences of irregular nodes are
+/// among those given: what a designer would call few and well placed.
+fn finishes(name: &str, patches: u64, valences: std::ops::RangeInclusive<u64>) {
+    let Some(woven) = weave(name) else { return };
+    assert!(woven.patches() <= patches, "{name}: {} patches", woven.patches());
+    let found = woven.valences();
+    assert!(found.keys().all(|v| valences.contains(v)), "{name}: irregular nodes of valence {found:?}");
+}
+
+#[test]
+fn creature_is_woven() {
+    finishes("creature", 14, 3..=5);
+}
+
+#[test]
+fn pretzel_is_woven() {
+    finishes("pretzel", 24, 3..=6);
+}
+
+#[test]
+fn sleeve_is_woven() {
+    finishes("sleeve", 16, 3..=6);
+}
+
+#[test]
+fn bunny_is_woven() {
+    finishes("bunny_7k", 6, 3..=3);
+}
+
+#[test]
+fn rocker_arm_is_woven() {
+    finishes("rockerarm_5k", 14, 3..=6);
+}
+
+#[test]
+fn three_holes_are_woven() {
+    finishes("cino_3holes", 24, 5..=5);
+}
+
+#[test]
+fn fertility_is_woven() {
+    finishes("fertility_13k", 24, 3..=8);
+}
+
+#[test]
+fn fandisk_is_woven() {
+    finishes("fandisk_14k", 12, 3..=5);
+}
+
+#[test]
+fn an_open_vase_is_woven() {
+    let Some(woven) = weave("vase_open") else { return };
+    // One patch, its corners at those of the boundary.
+    assert_eq!(woven.patches(), 1);
+    assert_eq!(woven.valences(), BTreeMap::from([(1, 4)]));
+}
+
+#[test]
+fn a_plate_with_holes_is_woven() {
+    finishes("aqua_center", 30, 1..=6);
+}
+
 /// A script on the torus, written to a file.
 fn torus_script(folder: &Path, steps: &str) -> PathBuf {
     let path = folder.join("script.json");
@@ -115,9 +174,10 @@ fn torus_script(folder: &Path, steps: &str) -> PathBuf {
     path
 }
 
-/// The two loops of the torus.
+/// The first loop of the torus.
 const MERIDIAN: &str = r#"{"hover": [1.07, 0, 0]}, {"place": true}"#;
-const EQUATOR: &str = r#"{"hover": [0, 0, -1.07]}, {"place": true}"#;
+/// Through the same point, where the meridian is no longer proposed.
+const EQUATOR: &str = MERIDIAN;
 
 #[test]
 fn steps_are_taken_back_and_made_again() {
@@ -132,7 +192,8 @@ fn steps_are_taken_back_and_made_again() {
     let history = r#"{"undo": true}, {"redo": true}, {"delete": 0}, {"delete": 0}, {"undo": true}, {"undo": true}"#;
     let around = design("around", &format!("{MERIDIAN}, {EQUATOR}, {history}"));
     assert!(straight == around, "undo and redo have changed the design");
-    let replaced = design("replaced", &format!("{EQUATOR}, {MERIDIAN}, {{\"delete\": 1}}, {MERIDIAN}"));
+    // Only the equator is left, so that the meridian is proposed again.
+    let replaced = design("replaced", &format!("{MERIDIAN}, {EQUATOR}, {{\"delete\": 0}}, {MERIDIAN}"));
     assert!(straight != replaced, "the order of the strips is lost");
 }
 
@@ -187,7 +248,8 @@ fn one_thread_and_two_write_the_same_bytes() {
         let [one, two, again] = [("one", "1"), ("two", "2"), ("again", "2")].map(|(folder, threads)| {
             let out = tempfile::tempdir().unwrap();
             let path = out.path().join(folder);
-            let arguments = ["weave", text(&script(name)), "--out", text(&path)];
+            let script = script(name);
+            let arguments = ["weave", text(&script), "--out", text(&path)];
             let output = plait_with(&arguments, &[("RAYON_NUM_THREADS", threads)]);
             assert!(output.status.success(), "{name}: {}", errors(&output));
             files(&path)

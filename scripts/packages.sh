@@ -1,4 +1,4 @@
-# Installing system packages on Debian and its kin; sourced by run.sh and test.sh.
+# Finding Rust, and installing system packages on Debian and its kin; sourced by run.sh and test.sh.
 
 # need PACKAGE...: installs those that are missing, or says in one line which they are and stops.
 need() {
@@ -26,6 +26,13 @@ need() {
         echo "Installing failed; install them with: apt-get install ${missing[*]}" >&2
         return 1
     }
+}
+
+# A shell that was open when Rust was installed does not know of it yet.
+command -v cargo >/dev/null || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+command -v cargo >/dev/null || {
+    echo "Rust is missing; install it from https://rustup.rs" >&2
+    exit 1
 }
 
 # What linking needs beyond Rust itself.

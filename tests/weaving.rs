@@ -66,10 +66,7 @@ fn weave(name: &str) -> Option<Woven> {
 
     let mesh = plait_core::mesh::load(&source).unwrap().mesh;
     let topology = plait_core::mesh::Topology::new(&mesh);
-    let expected = support::Shape {
-        euler: mesh.euler_characteristic(),
-        boundary_loops: topology.boundary_loops.len(),
-    };
+    let expected = support::Shape { euler: mesh.euler_characteristic(), boundary_loops: topology.boundary_loops.len() };
     let quads = read_faces(&folder.path().join("quads.obj"));
     assert!(quads.iter().all(|q| q.len() == 4), "{name}: not only quads");
     assert_eq!(quads.len() as u64, report["layout"]["quads"].as_u64().unwrap(), "{name}");
@@ -106,4 +103,183 @@ fn a_torus_takes_two_loops_for_its_one_patch() {
     let woven = weave("torus").unwrap();
     assert_eq!((woven.strips(), woven.patches()), (2, 1));
     assert!(woven.valences().is_empty());
+}
+
+/// Weaves and asserts that there are no more patches than `patches`, and that the valences of irregular nodes are
+/// among those given: what a designer would call few and well placed.
+fn finishes(name: &str, patches: u64, valences: std::ops::RangeInclusive<u64>) {
+    let Some(woven) = weave(name) else { return };
+    assert!(woven.patches() <= patches, "{name}: {} patches", woven.patches());
+    let found = woven.valences();
+    assert!(found.keys().all(|v| valences.contains(v)), "{name}: irregular nodes of valence {found:?}");
+}
+
+#[test]
+fn creature_is_woven() {
+    finishes("creature", 14, 3..=5);
+}
+
+#[test]
+fn pretzel_is_woven() {
+    finishes("pretzel", 24, 3..=6);
+}
+
+#[test]
+fn sleeve_is_woven() {
+    finishes("sleeve", 16, 3..=6);
+}
+
+#[test]
+fn bunny_is_woven() {
+    finishes("bunny_7k", 6, 3..=3);
+}
+
+#[test]
+fn rocker_arm_is_woven() {
+    finishes("rockerarm_5k", 14, 3..=6);
+}
+
+#[test]
+fn three_holes_are_woven() {
+    finishes("cino_3holes", 24, 5..=5);
+}
+
+#[test]
+fn fertility_is_woven() {
+    finishes("fertility_13k", 24, 3..=8);
+}
+
+#[test]
+fn fandisk_is_woven() {
+    finishes("fandisk_14k", 12, 3..=5);
+}
+
+#[test]
+fn an_open_vase_is_woven() {
+    let Some(woven) = weave("vase_open") else { return };
+    // One patch, its corners at those of the boundary.
+    assert_eq!(woven.patches(), 1);
+    assert_eq!(woven.valences(), BTreeMap::from([(1, 4)]));
+}
+
+#[test]
+fn a_plate_with_holes_is_woven() {
+    finishes("aqua_center", 30, 1..=6);
+}
+
+/// A script on the torus, written to a file.
+fn torus_script(folder: &Path, steps: &str) -> PathBuf {
+    let path = folder.join("script.json");
+    std::fs::write(&path, format!(r#"{{"mesh": "torus", "steps": [{steps}]}}"#)).unwrap();
+    path
+}
+
+/// The first loop of the torus.
+const MERIDIAN: &str = r#"{"hover": [1.07, 0, 0]}, {"place": true}"#;
+/// Through the same point, where the meridian is no longer proposed.
+const EQUATOR: &str = MERIDIAN;
+
+#[test]
+fn steps_are_taken_back_and_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = |name: &str, steps: &str| {
+        let out = folder.path().join(name);
+        let output = plait(&["weave", text(&torus_script(folder.path(), steps)), "--out", text(&out)]);
+        assert!(output.status.success(), "{name}: {}", errors(&output));
+        std::fs::read(out.join("design.plait")).unwrap()
+    };
+    let straight = design("straight", &format!("{MERIDIAN}, {EQUATOR}"));
+    let history = r#"{"undo": true}, {"redo": true}, {"delete": 0}, {"delete": 0}, {"undo": true}, {"undo": true}"#;
+    let around = design("around", &format!("{MERIDIAN}, {EQUATOR}, {history}"));
+    assert!(straight == around, "undo and redo have changed the design");
+    // Only the equator is left, so that the meridian is proposed again.
+    let replaced = design("replaced", &format!("{MERIDIAN}, {EQUATOR}, {{\"delete\": 0}}, {MERIDIAN}"));
+    assert!(straight != replaced, "the order of the strips is lost");
+}
+
+#[test]
+fn a_mistake_in_a_script_is_named_with_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for (steps, part) in [
+        (r#"{"browse": 1}"#.to_owned(), "step 1"),
+        (r#"{"place": true}"#.to_owned(), "step 1"),
+        (format!(r#"{MERIDIAN}, {{"delete": 1}}"#), "step 3"),
+        (format!(r#"{MERIDIAN}, {{"place": true}}"#), "step 3"),
+        (r#"{"hover": [1, 2]}"#.to_owned(), "not a weave script"),
+        (r#"{"jump": true}"#.to_owned(), "not a weave script"),
+    ] {
+        let output = plait(&["weave", text(&torus_script(folder.path(), &steps)), "--out", text(&out)]);
+        assert!(!output.status.success(), "{steps}");
+        assert!(errors(&output).contains(part), "{steps}: {}", errors(&output));
+    }
+}
+
+#[test]
+fn an_unfinished_layout_is_reported_and_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let output = plait(&["weave", text(&torus_script(folder.path(), MERIDIAN)), "--out", text(&out)]);
+    assert!(!output.status.success());
+    assert!(!errors(&output).is_empty());
+    let report = report(&out);
+    assert_eq!((&report["valid"], &report["layout"]), (&Value::Bool(false), &Value::Null));
+    assert!(report["colours"]["red"].as_u64().unwrap() > 0, "{report}");
+    assert!(report["problem"].as_str().is_some_and(|p| !p.is_empty()), "{report}");
+    assert!(out.join("design.plait").is_file() && !out.join("quads.obj").exists());
+}
+
+/// All files of a folder but the times in the report.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        files.insert(entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap());
+    }
+    let mut report = report(folder);
+    report.as_object_mut().unwrap().remove("seconds").unwrap();
+    files.insert("report.json".into(), report.to_string().into_bytes());
+    files
+}
+
+#[test]
+fn one_thread_and_two_write_the_same_bytes() {
+    for name in ["creature", "sleeve"] {
+        let [one, two, again] = [("one", "1"), ("two", "2"), ("again", "2")].map(|(folder, threads)| {
+            let out = tempfile::tempdir().unwrap();
+            let path = out.path().join(folder);
+            let script = script(name);
+            let arguments = ["weave", text(&script), "--out", text(&path)];
+            let output = plait_with(&arguments, &[("RAYON_NUM_THREADS", threads)]);
+            assert!(output.status.success(), "{name}: {}", errors(&output));
+            files(&path)
+        });
+        assert!(one.len() >= 5, "{:?}", one.keys());
+        for (file, bytes) in &one {
+            assert!(two[file] == *bytes, "{name}: {file} differs between one thread and two");
+            assert!(again[file] == *bytes, "{name}: {file} differs between two runs");
+        }
+    }
+}
+
+#[test]
+fn a_saved_design_opens_to_the_same_layout() {
+    let woven = weave("rounded-cube").unwrap();
+    let design = woven.file("design.plait");
+    let again = tempfile::tempdir().unwrap();
+    let output = plait(&["weave", text(&design), "--out", text(again.path())]);
+    assert!(output.status.success(), "{}", errors(&output));
+    for name in ["design.plait", "layout.obj", "quads.obj", "patches.obj"] {
+        let [before, after] = [woven.folder.path(), again.path()].map(|f| std::fs::read(f.join(name)).unwrap());
+        assert!(before == after, "{name} has changed");
+    }
+    let picture = woven.file("picture.png");
+    let output = plait(&["render", text(&design), "--out", text(&picture), "--size", "320x240"]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let bare = woven.file("bare.png");
+    let output = plait(&["render", "rounded-cube", "--out", text(&bare), "--size", "320x240"]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let [picture, bare] = [picture, bare].map(|p| image::open(p).unwrap().to_rgb8());
+    let different = picture.pixels().zip(bare.pixels()).filter(|(a, b)| a != b).count();
+    assert!(different > 1000, "the picture of the design shows no layout ({different} pixels differ)");
 }

@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::design::{DesignError, MeshSource};
 use super::model::Options;
 use super::session::{Proposal, Session, WeaveError};
-use super::suggest::Goal;
+use super::suggest::{Goal, Stuck};
 use crate::progress::Progress;
 
 /// One step of a designer.
@@ -25,7 +25,7 @@ pub enum Step {
     Browse(i64),
     /// Click: place the current proposal. `false` does nothing.
     Place(bool),
-    /// Press "Suggest" and place what is suggested. `false` does nothing.
+    /// Press "Suggest" and place what is suggested; does nothing when nothing is left to do. `false` does nothing.
     Suggest(bool),
     /// Remove the strip placed as the `n`-th of those present, from 0.
     Delete(usize),
@@ -175,8 +175,13 @@ impl Shown {
                 *self = Self::default();
             }
             Step::Suggest(true) => {
-                let proposal = session.suggest(Goal::Separated, progress)?;
-                session.place(proposal, progress)?;
+                match session.suggest(Goal::Separated, progress) {
+                    Ok(proposal) => {
+                        session.place(proposal, progress)?;
+                    }
+                    Err(WeaveError::Stuck(Stuck::Done)) => {}
+                    Err(error) => return Err(error.into()),
+                }
                 *self = Self::default();
             }
             Step::Delete(n) => {

@@ -122,6 +122,11 @@ impl PlaitApp {
         (self.hover.proposals.len(), self.hover.chosen)
     }
 
+    /// The strip selected in the list.
+    pub fn selected(&self) -> Option<StripId> {
+        self.selected
+    }
+
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera

@@ -151,8 +151,7 @@ impl PlaitApp {
 
     fn frame_all(&mut self) {
         if let Some(scene) = &self.scene {
-            let (centre, radius) = shading::bounding_sphere(&scene.surface);
-            self.camera.frame(centre, radius, self.view_size);
+            self.camera.frame(&shading::framing_points(&scene.surface), self.view_size);
         }
     }
 

@@ -10,6 +10,8 @@ mod model;
 mod script;
 mod session;
 mod suggest;
+#[cfg(test)]
+mod tests;
 mod woven;
 
 pub use design::{Design, DesignError, MeshSource, Strip, StripId};

@@ -137,12 +137,21 @@ impl Session {
                 Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
             })
             .collect();
+        // One workspace per thread: on open surfaces it holds a field that takes long to prepare.
+        let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
         let found: Vec<Vec<Proposal>> = queries
-            .par_iter()
-            .map_init(SearchWorkspace::new, |work, &(vertex, direction)| {
-                let query = ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
-                let found = graph.proposals(&query, work, progress)?;
-                found.loops.iter().map(|l| polished(graph, l, None, progress)).collect()
+            .par_chunks(share)
+            .map(|queries| {
+                let mut work = SearchWorkspace::new();
+                let mut list = Vec::new();
+                for &(vertex, direction) in queries {
+                    let query =
+                        ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
+                    for found in graph.proposals(&query, &mut work, progress)?.loops {
+                        list.push(polished(graph, &found, None, progress)?);
+                    }
+                }
+                Ok(list)
             })
             .collect::<Result<_, WeaveError>>()?;
         let mut all: Vec<Proposal> = found.into_iter().flatten().collect();

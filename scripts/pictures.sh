@@ -68,14 +68,15 @@ place() {
 }
 
 open creature
-point 500 470
+point 560 480
 picture hover
-xdotool click 1
-settle
-point 420 430
 xdotool click 5
 picture alternative
-place 700 445
+xdotool click 4
+settle
+xdotool click 1
+settle
+place 780 310
 picture red
 xdotool mousemove 20 800 key s
 picture three-strips
@@ -84,5 +85,6 @@ for _ in 1 2 3 4 5 6; do
     settle
 done
 picture regions
+# Without stripes and region colours.
 xdotool key 1 key 2
 picture layout

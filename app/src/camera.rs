@@ -3,7 +3,7 @@
 //! Right-handed; the turntable's axis is world y unless [`Camera::z_up`]. Angles in radians, lengths in world units
 //! (models are normalised to a bounding-box diagonal of 1), screen positions in points from the top left corner.
 
-use glam::{Mat4, Vec2, Vec3, Vec4Swizzles};
+use glam::{Mat4, Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};
 
 use crate::render::ViewUniforms;
 
@@ -11,6 +11,8 @@ use crate::render::ViewUniforms;
 const DISTANCES: std::ops::RangeInclusive<f32> = 0.005..=20.0;
 /// Just short of the poles, where "up" would have no meaning.
 const MAX_PITCH: f32 = 1.55;
+/// How much of the image a framed model fills.
+const FILLED: f32 = 0.86;
 /// Radians of turn per point of drag: half a turn across about 450 points.
 const TURN: f32 = 0.007;
 
@@ -123,12 +125,31 @@ impl Camera {
         ray.origin + ray.direction * (self.distance / ray.direction.dot(forward).max(1e-3))
     }
 
-    /// Looks at a sphere so that it fills the image, from the present direction.
-    pub fn frame(&mut self, centre: Vec3, radius: f32, size: Vec2) {
-        let half = (self.vertical_fov * 0.5).tan() * aspect(size).min(1.0);
-        let distance = radius * 1.02 / half.atan().sin();
-        self.target = centre;
-        self.distance = distance.clamp(*DISTANCES.start(), *DISTANCES.end());
+    /// Looks at `points` from the present direction so that they fill the image but for a margin.
+    pub fn frame(&mut self, points: &[Vec3], size: Vec2) {
+        if points.is_empty() {
+            return;
+        }
+        let sum: Vec3 = points.iter().sum();
+        self.target = sum / points.len() as f32;
+        let reach = points.iter().map(|p| p.distance(self.target)).fold(1e-3, f32::max);
+        let half = (self.vertical_fov * 0.5).tan();
+        let limits = Vec2::new(half * aspect(size), half) * FILLED;
+        self.distance = 2.0 * reach / limits.min_element();
+        // Perspective makes the fit a fixed point; from outside it is reached in a few steps.
+        for _ in 0..6 {
+            let view_from_world = self.view_from_world();
+            let slope = |p: &Vec3| {
+                let v = view_from_world.transform_point3(*p);
+                v.xy() / (-v.z).max(1e-3 * self.distance)
+            };
+            let (low, high) =
+                points.iter().map(slope).fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
+            let shift = (low + high) * 0.5 * self.distance;
+            self.target += self.world_from_view().transform_vector3(shift.extend(0.0));
+            let factor = ((high - low) * 0.5 / limits).max_element();
+            self.distance = (self.distance * factor).clamp(*DISTANCES.start(), *DISTANCES.end());
+        }
     }
 }
 
@@ -192,16 +213,18 @@ mod tests {
     }
 
     #[test]
-    fn a_framed_sphere_fits() {
+    fn a_framed_model_fills_the_image_and_fits() {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32 * 0.3, (i >> 2 & 1) as f32 * 0.2) + 0.4;
+        let points: Vec<Vec3> = (0..8).map(corner).collect();
         for size in [SIZE, Vec2::new(300.0, 900.0)] {
-            let mut camera = Camera::default();
-            let centre = Vec3::new(0.3, 0.0, 0.1);
-            camera.frame(centre, 0.5, size);
-            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
-                for p in [centre + axis * 0.5, centre - axis * 0.5] {
-                    let seen = camera.project(p, size).unwrap();
-                    assert!(seen.cmpge(Vec2::ZERO).all() && seen.cmple(size).all(), "{seen} in {size}");
-                }
+            for yaw in [0.0, 1.0, 4.0] {
+                let mut camera = Camera { yaw, ..Camera::default() };
+                camera.frame(&points, size);
+                let seen: Vec<Vec2> = points.iter().map(|&p| camera.project(p, size).unwrap() / size).collect();
+                let low = seen.iter().copied().fold(Vec2::INFINITY, Vec2::min);
+                let high = seen.iter().copied().fold(Vec2::NEG_INFINITY, Vec2::max);
+                assert!(low.min_element() > 0.03 && high.max_element() < 0.97, "{low} to {high} in {size}");
+                assert!((high - low).max_element() > 0.8, "{low} to {high} in {size}");
             }
         }
     }

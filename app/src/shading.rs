@@ -64,16 +64,11 @@ pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
     SurfaceMesh { vertices }
 }
 
-/// Centre and radius of a sphere around all of the surface: around its box's centre.
-pub fn bounding_sphere(display: &DisplaySurface) -> (Vec3, f32) {
-    let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    display.positions.iter().for_each(|&p| bounds = (bounds.0.min(p), bounds.1.max(p)));
-    if !bounds.0.is_finite() || !bounds.1.is_finite() {
-        return (Vec3::ZERO, 0.5);
-    }
-    let centre = (bounds.0 + bounds.1) * 0.5;
-    let radius = display.positions.iter().map(|p| p.distance(centre)).fold(1e-3, f64::max);
-    (centre.as_vec3(), radius as f32)
+/// Points of the surface to frame it by: all of a small one, some of a large one.
+pub fn framing_points(display: &DisplaySurface) -> Vec<Vec3> {
+    const ENOUGH: usize = 20_000;
+    let step = display.positions.len() / ENOUGH + 1;
+    display.positions.iter().step_by(step).map(|p| p.as_vec3()).collect()
 }
 
 /// Normals at the corners of each face: the mean, weighted by angle, over neighbours that turn by less than

@@ -35,8 +35,7 @@ fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
         ..Camera::default()
     };
     let size = Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32);
-    let (centre, radius) = shading::bounding_sphere(&scene.surface);
-    camera.frame(centre, radius, size);
+    camera.frame(&shading::framing_points(&scene.surface), size);
     Frame {
         scene: SceneInput {
             surface: Arc::new(shading::surface(&scene.surface)),

@@ -29,7 +29,7 @@ pub struct SessionOpener;
 
 impl Opener for SessionOpener {
     fn built_ins(&self) -> Vec<BuiltIn> {
-        builtin_names().map(|name| BuiltIn { name: name.into(), hint: String::new() }).collect()
+        builtin_names().map(|name| BuiltIn { name: name.into(), hint: hint(name).into() }).collect()
     }
 
     fn open(&self, source: &Source, progress: &Progress) -> Result<Box<dyn Engine>, EngineError> {
@@ -51,6 +51,18 @@ impl Opener for SessionOpener {
             Source::File(path) => start(MeshSource::File(absolute(path)), progress)?,
         };
         Ok(Box::new(SessionEngine::new(session)))
+    }
+}
+
+/// What a built-in model is good to try.
+fn hint(name: &str) -> &'static str {
+    match name {
+        "creature" => "limbs",
+        "rounded-cube" => "eight corners",
+        "torus" => "one handle",
+        "pretzel" => "three handles",
+        "sleeve" => "open, with boundaries",
+        _ => "",
     }
 }
 

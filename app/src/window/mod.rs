@@ -122,6 +122,11 @@ impl PlaitApp {
         (self.hover.proposals.len(), self.hover.chosen)
     }
 
+    /// The strip selected in the list.
+    pub fn selected(&self) -> Option<StripId> {
+        self.selected
+    }
+
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
@@ -146,8 +151,7 @@ impl PlaitApp {
 
     fn frame_all(&mut self) {
         if let Some(scene) = &self.scene {
-            let (centre, radius) = shading::bounding_sphere(&scene.surface);
-            self.camera.frame(centre, radius, self.view_size);
+            self.camera.frame(&shading::framing_points(&scene.surface), self.view_size);
         }
     }
 

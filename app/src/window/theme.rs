@@ -26,7 +26,8 @@ pub const BAD: Color32 = Color32::from_rgb(0xb9, 0x2d, 0x29);
 /// Sets fonts' sizes, spacing and colours once at the start.
 pub fn apply(ctx: &egui::Context) {
     ctx.set_theme(egui::Theme::Light);
-    ctx.style_mut_of(egui::Theme::Light, |style| {
+    // Both styles: whoever asks for the dark one gets the same look.
+    ctx.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles = [
             (TextStyle::Small, font(12.0)),

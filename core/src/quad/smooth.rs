@@ -61,3 +61,91 @@ pub fn smooth(mesh: &mut QuadMesh, base: &TriMesh, progress: &Progress) -> Resul
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::VertexId;
+    use crate::testing::{square, torus};
+
+    /// A grid of quads whose corners are those of every second row and column of a mesh's grid.
+    fn grid(base: &TriMesh, (rows, columns): (usize, usize), closed: bool) -> QuadMesh {
+        let (m, n) = (rows / 2, columns / 2);
+        let wide = if closed { columns } else { columns + 1 };
+        let (tall, across) = if closed { (m, n) } else { (m + 1, n + 1) };
+        let id = |i: usize, j: usize| ((i % tall) * across + j % across) as u32;
+        let vertices: Vec<VertexId> =
+            (0..tall * across).map(|k| VertexId::new(2 * (k / across) * wide + 2 * (k % across))).collect();
+        let cells = (0..m).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let quads: Vec<[u32; 4]> =
+            cells.map(|(i, j)| [id(i, j), id(i, j + 1), id(i + 1, j + 1), id(i + 1, j)]).collect();
+        QuadMesh {
+            positions: vertices.iter().map(|&v| base.position(v)).collect(),
+            base_face: vertices.iter().map(|&v| base.face(base.vertex_halfedge(v)).0).collect(),
+            boundary: vertices.iter().map(|&v| base.is_boundary_vertex(v)).collect(),
+            patch: vec![0; quads.len()],
+            quads,
+            n_nodes: 1,
+        }
+    }
+
+    /// Throws vertices about by up to `far`, back onto the surface.
+    fn tangle(mesh: &mut QuadMesh, base: &TriMesh, far: f64) {
+        let ground = Ground::new(base);
+        for v in 0..mesh.positions.len() {
+            let noise = |k: usize| ((v * 7919 + k * 104_729) as f64 * 0.618_033_988_75).fract() - 0.5;
+            if !mesh.boundary[v] {
+                let wanted = mesh.positions[v] + 2.0 * far * DVec3::new(noise(1), noise(2), noise(3));
+                (mesh.positions[v], mesh.base_face[v]) = ground.follow(wanted, mesh.base_face[v]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_tangled_torus_is_untangled() {
+        let base = torus(48, 24);
+        let mut mesh = grid(&base, (24, 48), true);
+        let side = mesh.positions[0].distance(mesh.positions[1]);
+        tangle(&mut mesh, &base, side);
+        let before = quality(&mesh);
+        assert!(before.0 > 20, "{before:?}");
+        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        let after = quality(&mesh);
+        assert!(after.0 == 0 && after.1 > 0.85, "{before:?} {after:?}");
+        let ground = Ground::new(&base);
+        for (&p, &f) in mesh.positions.iter().zip(&mesh.base_face) {
+            assert!(ground.follow(p, f).0.distance(p) < 1e-12, "vertices stay on the surface");
+        }
+    }
+
+    #[test]
+    fn the_boundary_stays_covered_in_order() {
+        let base = square(16);
+        let mut mesh = grid(&base, (16, 16), false);
+        tangle(&mut mesh, &base, 0.1);
+        let corners: Vec<usize> = [0, 8, 72, 80].to_vec();
+        let before = mesh.positions.clone();
+        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        assert_eq!(quality(&mesh).0, 0);
+        for k in corners {
+            assert_eq!(mesh.positions[k], before[k], "corners stay");
+        }
+        for row in [&mesh.positions[..9], &mesh.positions[72..]] {
+            for w in row.windows(2) {
+                let step = w[1] - w[0];
+                assert!(step.dot(before[1] - before[0]) > 0.0 && step.cross(before[1] - before[0]).length() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_perfect_grid_stays_as_it_is() {
+        let base = square(16);
+        let mut mesh = grid(&base, (16, 16), false);
+        let before = mesh.positions.clone();
+        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        assert!(mesh.positions.iter().zip(&before).all(|(p, q)| p.distance(*q) < 1e-9));
+    }
+}

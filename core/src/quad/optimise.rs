@@ -173,7 +173,7 @@ impl Local<'_> {
                 };
                 let i = k as usize + step;
                 let [a, b] = self.aims.lengths[q as usize];
-                let lengths = if i % 2 == 0 { [a, b] } else { [b, a] };
+                let lengths = if i.is_multiple_of(2) { [a, b] } else { [b, a] };
                 let ideal = Ideal { lengths, angle: self.aims.angles[quad[i % 4] as usize] };
                 (Corner::new([at(i), at(i + 1), at(i + 3)], self.aims.normals[q as usize], ideal), moving)
             })

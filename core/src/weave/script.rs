@@ -76,7 +76,7 @@ pub enum ScriptError {
         /// Number of the step, from 1.
         step: usize,
         /// Why.
-        source: WeaveError,
+        source: Box<WeaveError>,
     },
     /// A step that makes no sense where it stands.
     #[error("step {step}: {reason}")]
@@ -117,7 +117,7 @@ pub fn replay(script: &Script, folder: &Path, progress: &Progress) -> Result<Ses
         builtin @ MeshSource::Builtin(_) => builtin,
     };
     let mut session = Session::open(loaded, source, script.options, progress)
-        .map_err(|source| ScriptError::Step { step: 0, source })?;
+        .map_err(|source| ScriptError::Step { step: 0, source: Box::new(source) })?;
     let mut shown = Shown::default();
     for (i, step) in script.steps.iter().enumerate() {
         shown.take(step, &mut session, progress).map_err(|e| match e {
@@ -136,13 +136,13 @@ struct Shown {
 }
 
 enum StepError {
-    Weave(WeaveError),
+    Weave(Box<WeaveError>),
     Senseless(&'static str),
 }
 
 impl From<WeaveError> for StepError {
     fn from(error: WeaveError) -> Self {
-        Self::Weave(error)
+        Self::Weave(Box::new(error))
     }
 }
 

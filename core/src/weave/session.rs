@@ -165,7 +165,7 @@ impl Session {
         let found = graph.proposals_with(&query, &mut self.workspace, progress, |l| {
             first(Proposal { curve: l.curve.clone(), cost: l.cost });
         })?;
-        found.loops.into_iter().map(|l| polished(graph, &l, Some(at), progress)).collect()
+        found.loops.into_iter().map(|l| polished(graph, &l, at, progress)).collect()
     }
 
     /// Places a strip.
@@ -257,13 +257,13 @@ impl Session {
 }
 
 /// A found loop, relaxed to a smooth curve that still passes `at`.
-pub(super) fn polished(
+fn polished(
     graph: &ElasticaGraph,
     found: &FoundLoop,
-    at: Option<SurfacePoint>,
+    at: SurfacePoint,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
-    let options = RelaxOptions { anchors: at.into_iter().map(Anchor::Point).collect(), ..Default::default() };
+    let options = RelaxOptions { anchors: vec![Anchor::Point(at)], ..Default::default() };
     let curve = match relax(graph.mesh(), &found.curve, &options, progress) {
         Ok(relaxed) => relaxed.curve,
         Err(error) => {

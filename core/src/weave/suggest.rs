@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::detour::detours;
-use super::session::{Proposal, Session, WeaveError, polished};
+use super::session::{Proposal, Session, WeaveError};
 use crate::dual::{Colour, Finding, RegionReport, assess};
 use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
-use crate::surface::{RelaxOptions, relax};
+use crate::surface::{RelaxOptions, SurfaceCurve, relax};
 
 /// How far a layout is to be woven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,11 +43,11 @@ pub enum Stuck {
 }
 
 /// Points tried in the most urgent region: enough to meet each of its limbs.
-const POINTS: usize = 12;
+const POINTS: usize = 10;
 /// Candidates tried in the arrangement, the cheapest first.
-const TRIED: usize = 48;
+const TRIED: usize = 32;
 /// Search states settled per point, at most: bounds the time on large meshes.
-const BUDGET: u64 = 200_000;
+const BUDGET: u64 = 120_000;
 /// Classes of curves tried per region when no elastica loop helps.
 const DETOURS: usize = 200;
 /// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edges: it is jagged.
@@ -77,11 +77,12 @@ impl Session {
         // First where and how strips should go; then in every direction, wherever it is urgent; then also
         // along strips that are there; at last by connectivity alone.
         let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
-        for (search, mask, regions) in stages {
+        for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
+            progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
             for &region in urgent.iter().take(regions) {
                 let candidates = self.candidates(region, search, mask, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
-                    return Ok(best);
+                    return Ok(self.smoothed(best, RelaxOptions::default().tube, before, goal, progress)?);
                 }
             }
         }
@@ -89,7 +90,7 @@ impl Session {
             let root = woven.arrangement.regions[region as usize].faces[0];
             let curves = detours(&woven.arrangement, &self.model().mesh, root, DETOURS);
             if let Some(best) = self.best_of(curves, before, goal, progress)? {
-                return Ok(self.smoothed(best, progress));
+                return Ok(self.smoothed(best, WIDE_TUBE, before, goal, progress)?);
             }
         }
         let reason = woven.reports[first as usize].findings.first().map(ToString::to_string).unwrap_or_default();
@@ -112,13 +113,30 @@ impl Session {
         }
     }
 
-    /// A curve that was found by connectivity alone, relaxed.
-    fn smoothed(&self, proposal: Proposal, progress: &Progress) -> Proposal {
-        let options = RelaxOptions { tube: WIDE_TUBE, ..Default::default() };
-        match relax(&self.model().mesh, &proposal.curve, &options, progress) {
-            Ok(relaxed) => Proposal { curve: relaxed.curve, cost: proposal.cost },
-            Err(_) => proposal,
-        }
+    /// A curve relaxed within a tube of so many mean edges, if it then still makes progress; else as it is.
+    fn smoothed(
+        &self,
+        proposal: Proposal,
+        tube: f64,
+        before: f64,
+        goal: Goal,
+        progress: &Progress,
+    ) -> Result<Proposal, Cancelled> {
+        let model = self.model();
+        let relaxed = relax(&model.mesh, &proposal.curve, &RelaxOptions { tube, ..Default::default() }, progress);
+        progress.check()?;
+        let Ok(relaxed) = relaxed else { return Ok(proposal) };
+        let helps = self.gain(&relaxed.curve, before, goal).is_some();
+        Ok(if helps { Proposal { curve: relaxed.curve, cost: proposal.cost } } else { proposal })
+    }
+
+    /// By how much a curve would reduce the deficit, if it would.
+    fn gain(&self, curve: &SurfaceCurve, before: f64, goal: Goal) -> Option<f64> {
+        let model = self.model();
+        let arrangement = self.arranged_with(curve).ok()?;
+        let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
+        let gain = before - deficit(&reports, goal);
+        (gain > 1e-9).then_some(gain)
     }
 
     /// Loops through well-spread points of a region, the cheapest first.
@@ -147,15 +165,18 @@ impl Session {
                 for &(vertex, direction) in queries {
                     let query =
                         ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
-                    for found in graph.proposals(&query, &mut work, progress)?.loops {
-                        list.push(polished(graph, &found, None, progress)?);
-                    }
+                    let found = graph.proposals(&query, &mut work, progress)?;
+                    list.extend(found.loops.into_iter().map(|l| Proposal { curve: l.curve, cost: l.cost }));
                 }
                 Ok(list)
             })
             .collect::<Result<_, WeaveError>>()?;
         let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        // The same loop is found from many of its points.
+        all.dedup_by(|b, a| {
+            (b.cost - a.cost).abs() < 1e-6 * a.cost && a.curve.crossings.len() == b.curve.crossings.len()
+        });
         all.truncate(TRIED);
         Ok(all)
     }
@@ -177,15 +198,11 @@ impl Session {
         goal: Goal,
         progress: &Progress,
     ) -> Result<Option<Proposal>, Cancelled> {
-        let model = self.model();
         let prices: Vec<Option<f64>> = candidates
             .par_iter()
             .map(|c| {
                 progress.check()?;
-                let Ok(arrangement) = self.arranged_with(&c.curve) else { return Ok(None) };
-                let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
-                let gain = before - deficit(&reports, goal);
-                Ok((gain > 1e-9).then(|| c.cost / gain))
+                Ok(self.gain(&c.curve, before, goal).map(|gain| c.cost / gain))
             })
             .collect::<Result<_, Cancelled>>()?;
         let best = prices

@@ -171,6 +171,7 @@ impl Session {
                 Ok(list)
             })
             .collect::<Result<_, WeaveError>>()?;
+        tracing::debug!(?search, region, queries = queries.len(), "searched");
         let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         // The same loop is found from many of its points.
@@ -205,6 +206,7 @@ impl Session {
                 Ok(self.gain(&c.curve, before, goal).map(|gain| c.cost / gain))
             })
             .collect::<Result<_, Cancelled>>()?;
+        tracing::debug!(candidates = candidates.len(), helpful = prices.iter().flatten().count(), "tried");
         let best = prices
             .iter()
             .enumerate()

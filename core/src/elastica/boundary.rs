@@ -5,6 +5,8 @@
 //! One field of distances from the boundary serves every vertex: reversed, it holds the cheapest way from each state
 //! to the boundary. It is computed once for each set of closed directions.
 
+use std::sync::Arc;
+
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::search::{Field, Route, SearchWorkspace};
@@ -35,7 +37,7 @@ impl SearchWorkspace {
         if !graph.has_boundary {
             self.boundary = None;
         } else if !self.boundary.as_ref().is_some_and(|b| b.n_states == graph.n_states() && b.mask == *mask) {
-            self.boundary = Some(BoundaryField::new(graph, mask, progress)?);
+            self.boundary = Some(Arc::new(BoundaryField::new(graph, mask, progress)?));
         }
         Ok(())
     }

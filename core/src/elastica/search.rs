@@ -14,7 +14,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
@@ -152,13 +152,18 @@ pub struct SearchWorkspace {
     pub(super) out: Vec<Field>,
     pub(super) home: Vec<Field>,
     pub(super) ahead: Vec<Field>,
-    pub(super) boundary: Option<BoundaryField>,
+    pub(super) boundary: Option<Arc<BoundaryField>>,
 }
 
 impl SearchWorkspace {
     /// An empty workspace; it grows with the first search.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A workspace for another thread that shares what [`Self::prepare`] has made.
+    pub fn sharing(&self) -> Self {
+        Self { boundary: self.boundary.clone(), ..Self::default() }
     }
 }
 

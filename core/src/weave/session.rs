@@ -162,10 +162,21 @@ impl Session {
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
         let query = ProposalQuery::alternatives(vertex, &self.woven.mask);
-        let found = graph.proposals_with(&query, &mut self.workspace, progress, |l| {
+        let mut found = graph.proposals_with(&query, &mut self.workspace, progress, |l| {
             first(Proposal { curve: l.curve.clone(), cost: l.cost });
         })?;
+        if found.loops.is_empty() {
+            // Strips cover every way through here; only their spines are then kept clear of.
+            let query = ProposalQuery { mask: &self.woven.spine_mask, ..query };
+            found = graph.proposals(&query, &mut SearchWorkspace::new(), progress)?;
+        }
         found.loops.into_iter().map(|l| polished(graph, &l, at, progress)).collect()
+    }
+
+    /// A workspace that shares what searches with the present mask have to prepare on open surfaces.
+    pub(super) fn prepared_workspace(&mut self, progress: &Progress) -> Result<SearchWorkspace, Cancelled> {
+        self.workspace.prepare(&self.model.graph, &self.woven.mask, progress)?;
+        Ok(self.workspace.sharing())
     }
 
     /// Places a strip.

@@ -68,7 +68,8 @@ impl Session {
     /// # Errors
     ///
     /// [`Stuck`], or cancelled.
-    pub fn suggest(&self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
+    pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
+        let shared = self.prepared_workspace(progress)?;
         let woven = self.woven();
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
@@ -80,7 +81,7 @@ impl Session {
         for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
             progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
             for &region in urgent.iter().take(regions) {
-                let candidates = self.candidates(region, search, mask, progress)?;
+                let candidates = self.candidates(region, search, mask, &shared, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
                     return Ok(self.smoothed(best, RelaxOptions::default().tube, before, goal, progress)?);
                 }
@@ -145,6 +146,7 @@ impl Session {
         region: u32,
         search: Search,
         mask: &DirectionMask,
+        shared: &SearchWorkspace,
         progress: &Progress,
     ) -> Result<Vec<Proposal>, WeaveError> {
         let graph = &self.model().graph;
@@ -155,12 +157,12 @@ impl Session {
                 Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
             })
             .collect();
-        // One workspace per thread: on open surfaces it holds a field that takes long to prepare.
+        // One workspace per thread; with the usual mask they share what is prepared already.
         let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
         let found: Vec<Vec<Proposal>> = queries
             .par_chunks(share)
             .map(|queries| {
-                let mut work = SearchWorkspace::new();
+                let mut work = shared.sharing();
                 let mut list = Vec::new();
                 for &(vertex, direction) in queries {
                     let query =

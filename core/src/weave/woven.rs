@@ -25,6 +25,8 @@ pub struct Woven {
     pub reports: Vec<RegionReport>,
     /// Directions in which no further strip may run.
     pub mask: DirectionMask,
+    /// Of these only the directions along the strips' spines.
+    pub spine_mask: DirectionMask,
     /// The refined mesh of the arrangement as a mesh of its own.
     pub mesh: TriMesh,
     /// The map of all strips on that mesh; `None` without strips, or where it cannot be computed.
@@ -43,14 +45,15 @@ impl Woven {
         let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let mesh = arrangement.refined.to_mesh().map_err(ArrangementError::from)?;
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
-        let mut mask = DirectionMask::none();
+        let mut spine_mask = DirectionMask::none();
         for strip in strips {
-            close_along(model, strip, &mut mask);
+            close_along(model, strip, &mut spine_mask);
         }
+        let mut mask = spine_mask.clone();
         if let Some(map) = &strip_map {
             close_inside(model, &arrangement, &mesh, map, &mut mask);
         }
-        Ok(Self { arrangement, reports, mask, mesh, strip_map })
+        Ok(Self { arrangement, reports, mask, spine_mask, mesh, strip_map })
     }
 
     /// The regions that cannot be nodes yet.

@@ -19,4 +19,5 @@ need "${packages[@]}"
 if cargo deny --version >/dev/null 2>&1; then
     cargo deny --offline check licenses || cargo deny check licenses
 fi
-cargo test --workspace "$@"
+# No example needs documentation tests: the public items are shown in use by the tests.
+cargo test --workspace --lib --bins --tests "$@"

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::dual::{Arrangement, Colour};
-use plait_core::layout::{LayoutError, QuadLayout, embed};
+use plait_core::layout::LayoutError;
 use plait_core::mesh::builtin_names;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
@@ -259,19 +259,19 @@ fn or_nothing<T>(result: Result<T, impl std::fmt::Display>, progress: &Progress)
 
 /// Nodes and arcs of the layout on the surface.
 fn layout_preview(session: &Session, progress: &Progress) -> Result<LayoutPreview, WeaveError> {
-    let (model, woven) = (session.model(), session.woven());
-    let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
-    let only = |r: &plait_core::dual::RegionReport| (r.corners.len() == 1).then(|| r.corners[0].0);
-    let preferred: Vec<_> = woven.reports.iter().map(only).collect();
-    let embedding = embed(&woven.arrangement, &layout, &preferred, progress)?;
-    let position = |&v: &u32| embedding.mesh.positions[v as usize];
-    let node = |(node, v): (&plait_core::layout::Node, &u32)| LayoutNode {
-        position: position(v),
+    let export = weave::export(session, &weave::ExportOptions { size: QuadSize::Count(PREVIEW_QUADS) }, progress)?;
+    let quads = &export.quads;
+    let node = |(node, &position): (&plait_core::layout::Node, &DVec3)| LayoutNode {
+        position,
         valence: node.valence as u32,
         irregular: !node.is_regular(),
     };
+    let position = |&v: &u32| quads.positions[v as usize];
     Ok(LayoutPreview {
-        arcs: embedding.arcs.iter().map(|arc| arc.iter().map(position).collect()).collect(),
-        nodes: layout.nodes.iter().zip(&embedding.nodes).map(node).collect(),
+        arcs: quads.arcs.iter().map(|arc| arc.iter().map(position).collect()).collect(),
+        nodes: export.layout.nodes.iter().zip(&quads.positions).map(node).collect(),
     })
 }
+
+/// Quads behind the preview of a layout: its arcs are those of the exported quads, at half their fineness.
+const PREVIEW_QUADS: u32 = 3000;

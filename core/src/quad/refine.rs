@@ -20,8 +20,10 @@ pub struct QuadMesh {
     pub base_face: Vec<u32>,
     /// Whether each vertex lies on the boundary.
     pub boundary: Vec<bool>,
-    /// Layout node of each of the first vertices.
+    /// Number of layout nodes; they are the first vertices, in order.
     pub n_nodes: usize,
+    /// Vertices of each layout arc, from its first node to its second.
+    pub arcs: Vec<Vec<u32>>,
 }
 
 /// The number of quads across every chord for quads of edge length `target`.
@@ -52,6 +54,7 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
         quads: Vec::new(),
         patch: Vec::new(),
         n_nodes: layout.nodes.len(),
+        arcs: Vec::with_capacity(layout.arcs.len()),
     };
     let mut first_on_arc = Vec::with_capacity(layout.arcs.len());
     for (arc, path) in layout.arcs.iter().zip(&embedding.arcs) {
@@ -62,6 +65,8 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
             out.base_face.push(face_at(v));
             out.boundary.push(arc.boundary);
         }
+        let inner = first_on_arc[first_on_arc.len() - 1]..out.positions.len() as u32;
+        out.arcs.push([arc.nodes[0]].into_iter().chain(inner).chain([arc.nodes[1]]).collect());
     }
     for (p, map) in maps.iter().enumerate() {
         let [m, n] = [0, 1].map(|i| counts[layout.arcs[layout.patches[p].sides[i].0 as usize].chord as usize]);

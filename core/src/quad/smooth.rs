@@ -88,6 +88,7 @@ mod tests {
             patch: vec![0; quads.len()],
             quads,
             n_nodes: 1,
+            arcs: Vec::new(),
         }
     }
 

@@ -138,10 +138,9 @@ impl Export {
     /// The file that could not be written.
     pub fn write(&self, folder: &Path, units: &Normalization) -> Result<(), WeaveError> {
         let in_file = |ps: &[glam::DVec3]| ps.iter().map(|&p| units.to_file(p)).collect::<Vec<_>>();
-        let nodes: Vec<glam::DVec3> =
-            self.embedding.nodes.iter().map(|&v| self.embedding.mesh.positions[v as usize]).collect();
+        let nodes = &self.quads.positions[..self.quads.n_nodes];
         let corners: Vec<[u32; 4]> = self.layout.patches.iter().map(|p| p.corners).collect();
-        write_file(&folder.join("layout.obj"), |out| write_obj(out, &in_file(&nodes), &corners))?;
+        write_file(&folder.join("layout.obj"), |out| write_obj(out, &in_file(nodes), &corners))?;
         write_file(&folder.join("quads.obj"), |out| {
             write_obj(out, &in_file(&self.quads.positions), &self.quads.quads)
         })?;

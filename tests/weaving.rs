@@ -80,9 +80,16 @@ fn weave(name: &str) -> Option<Woven> {
     if let Some(figures) = independent_check(&folder.path().join("quads.obj"), &source) {
         let distance = figures["distance_mean"].as_f64().unwrap();
         assert!(distance < 0.005, "{name}: the quads stray from the surface by {distance}");
+        // A boundary node of one patch on a smooth boundary has a flat corner: its quad is neither folded nor not.
+        if !FLAT_CORNERS.contains(&name) {
+            assert_eq!(figures["folded"], 0, "{name}: folded quads");
+        }
     }
     Some(Woven { folder, report })
 }
+
+/// Scripts whose layouts have boundary nodes where just one patch meets a smooth boundary.
+const FLAT_CORNERS: [&str; 2] = ["aqua_center", "vase_open"];
 
 #[test]
 fn a_rounded_cube_takes_three_strips_for_its_eight_corners() {
@@ -131,7 +138,7 @@ fn sleeve_is_woven() {
 
 #[test]
 fn bunny_is_woven() {
-    finishes("bunny_7k", 6, 3..=3);
+    finishes("bunny_7k", 36, 3..=6);
 }
 
 #[test]

@@ -25,6 +25,9 @@ const BEND: f64 = 0.3;
 const ANGLES: (f64, f64) = (0.5, 2.4);
 /// How much of a side's length is its quad's own; the rest is the mean of its patch.
 const OWN: f64 = 0.6;
+/// How much of the length aimed at is the one in the mesh that was given, which covers the surface evenly. Lengths
+/// that only follow the quads let these slide off a limb, since chords across it are shorter than the way around.
+const KEPT: f64 = 0.5;
 /// Longest step in mean sides of the quads around.
 const LONGEST: f64 = 1.0;
 
@@ -36,6 +39,8 @@ pub(super) struct Around {
     corners: Vec<Vec<CornerOf>>,
     /// Vertices that may move at once.
     colours: Vec<Vec<u32>>,
+    /// Side lengths of the quads at the start.
+    given: Vec<[f64; 2]>,
 }
 
 impl Around {
@@ -60,7 +65,8 @@ impl Around {
             }
             colours[c].push(v as u32);
         }
-        Self { corners, colours }
+        let given = mesh.quads.iter().map(|q| own_lengths(mesh, q)).collect();
+        Self { corners, colours, given }
     }
 }
 
@@ -119,12 +125,13 @@ impl Aims {
             };
             DVec2::from_angle(angle.clamp(ANGLES.0, ANGLES.1))
         });
-        Self { normals: normals.collect(), lengths: lengths(mesh), angles: angles.collect() }
+        Self { normals: normals.collect(), lengths: lengths(mesh, &around.given), angles: angles.collect() }
     }
 }
 
-/// The side lengths that quads should have: their own mean sides, drawn towards the mean of their patch.
-fn lengths(mesh: &QuadMesh) -> Vec<[f64; 2]> {
+/// The side lengths that quads should have: their own mean sides, drawn towards the mean of their patch and to the
+/// lengths `given` before the optimisation.
+fn lengths(mesh: &QuadMesh, given: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let n_patches = mesh.patch.iter().max().map_or(0, |&p| p as usize + 1);
     let mut sum = vec![[0.0; 3]; n_patches];
     let own: Vec<[f64; 2]> = mesh.quads.iter().map(|q| own_lengths(mesh, q)).collect();
@@ -135,7 +142,8 @@ fn lengths(mesh: &QuadMesh) -> Vec<[f64; 2]> {
     }
     let mean = |p: u32, i: usize| sum[p as usize][i] / sum[p as usize][2];
     let drawn = |(s, &p): (&[f64; 2], &u32)| [0, 1].map(|i| (OWN * s[i] + (1.0 - OWN) * mean(p, i)).max(1e-12));
-    own.iter().zip(&mesh.patch).map(drawn).collect()
+    let kept = |(now, given): ([f64; 2], &[f64; 2])| [0, 1].map(|i| (1.0 - KEPT) * now[i] + KEPT * given[i]);
+    own.iter().zip(&mesh.patch).map(drawn).zip(given).map(kept).collect()
 }
 
 /// Mean lengths of the two pairs of opposite sides.

@@ -527,4 +527,29 @@ mod tests {
             assert_eq!((r.corners(), r.boundary_stretches()), (1, 1));
         }
     }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
+
+        /// Rows and columns of a torus in any order, at any places: each pair crosses once, and the regions are
+        /// the cells of a grid.
+        #[test]
+        fn rows_and_columns_make_a_grid(
+            curves in proptest::collection::vec((proptest::bool::ANY, 0u32..8, 0.001f64..0.999), 2..9)
+        ) {
+            let mesh = torus(8, 8);
+            let rows = curves.iter().filter(|c| c.0).count();
+            let columns = curves.len() - rows;
+            let list: Vec<SurfaceCurve> = curves
+                .iter()
+                .map(|&(is_row, at, t)| if is_row { row(8, at, true, t) } else { column(8, 8, at, true, t) })
+                .collect();
+            let a = checked(&mesh, &list);
+            proptest::prop_assert_eq!(a.crossings.len(), rows * columns);
+            if rows > 0 && columns > 0 {
+                proptest::prop_assert_eq!(a.regions.len(), rows * columns);
+                proptest::prop_assert!(a.regions.iter().all(|r| r.is_disc() && r.corners() == 4));
+            }
+        }
+    }
 }

@@ -10,7 +10,7 @@ use crate::dual::Colour;
 use crate::layout::{Embedding, PatchMap, QuadLayout, embed, map_patches};
 use crate::mesh::{Normalization, VertexId, write_obj};
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, chord_counts, refine, smooth};
+use crate::quad::{QuadMesh, chord_counts, quality, refine, smooth};
 
 /// How fine the quads are to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +127,23 @@ struct LayoutReport {
     valences: std::collections::BTreeMap<usize, usize>,
     euler: i64,
     quads: usize,
+    folded_quads: usize,
+    mean_scaled_jacobian: f64,
     flipped_triangles: usize,
+    checks: Checks,
+}
+
+/// What was checked of a finished layout.
+#[derive(Debug, Serialize)]
+struct Checks {
+    /// Nodes, arcs and patches add up to the Euler characteristic, and sides join corners.
+    structure: bool,
+    /// Every patch is a disc with four sides on the surface.
+    patches_are_discs: bool,
+    /// No map of a patch turns a triangle over.
+    maps_are_one_to_one: bool,
+    /// No quad of the refinement is folded.
+    quads_are_unfolded: bool,
 }
 
 impl Export {
@@ -249,6 +265,14 @@ fn layout_report(e: &Export, euler: i64) -> LayoutReport {
     for n in e.layout.nodes.iter().filter(|n| !n.is_regular()) {
         *valences.entry(n.valence).or_insert(0) += 1;
     }
+    let (folded_quads, mean_scaled_jacobian) = quality(&e.quads);
+    let flipped_triangles = e.maps.iter().map(|m| m.flipped).sum();
+    let checks = Checks {
+        structure: e.layout.check(euler).is_ok(),
+        patches_are_discs: e.maps.iter().all(|m| m.mesh.euler_characteristic() == 1),
+        maps_are_one_to_one: flipped_triangles == 0,
+        quads_are_unfolded: folded_quads == 0,
+    };
     LayoutReport {
         nodes: e.layout.nodes.len(),
         arcs: e.layout.arcs.len(),
@@ -258,7 +282,10 @@ fn layout_report(e: &Export, euler: i64) -> LayoutReport {
         valences,
         euler,
         quads: e.quads.quads.len(),
-        flipped_triangles: e.maps.iter().map(|m| m.flipped).sum(),
+        folded_quads,
+        mean_scaled_jacobian,
+        flipped_triangles,
+        checks,
     }
 }
 

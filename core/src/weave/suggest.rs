@@ -69,7 +69,7 @@ impl Session {
     ///
     /// [`Stuck`], or cancelled.
     pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
-        let shared = self.prepared_workspace(progress)?;
+        let mut shared = self.prepared_workspace(progress)?;
         let woven = self.woven();
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
@@ -80,6 +80,7 @@ impl Session {
         let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
         for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
             progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
+            shared.prepare(&self.model().graph, mask, progress)?;
             for &region in urgent.iter().take(regions) {
                 let candidates = self.candidates(region, search, mask, &shared, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
@@ -157,7 +158,7 @@ impl Session {
                 Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
             })
             .collect();
-        // One workspace per thread; with the usual mask they share what is prepared already.
+        // One workspace per thread; they share what is prepared already.
         let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
         let found: Vec<Vec<Proposal>> = queries
             .par_chunks(share)

@@ -15,4 +15,5 @@ pub mod strip;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;
+mod union_find;
 pub mod weave;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::dual::{Arrangement, SideKind};
+use crate::union_find::UnionFind;
 
 /// A node, dual to the region of the same index.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -148,16 +149,15 @@ impl QuadLayout {
 
     /// Numbers the classes of opposite arcs.
     fn find_chords(&mut self) {
-        let mut parent: Vec<u32> = (0..self.arcs.len() as u32).collect();
+        let mut sets = UnionFind::new(self.arcs.len());
         for p in &self.patches {
             for i in 0..2 {
-                let (a, b) = (root(&mut parent, p.sides[i].0), root(&mut parent, p.sides[i + 2].0));
-                parent[a.max(b) as usize] = a.min(b);
+                sets.join(p.sides[i].0, p.sides[i + 2].0);
             }
         }
-        let mut number = vec![u32::MAX; parent.len()];
+        let mut number = vec![u32::MAX; self.arcs.len()];
         for a in 0..self.arcs.len() {
-            let r = root(&mut parent, a as u32) as usize;
+            let r = sets.root(a as u32) as usize;
             if number[r] == u32::MAX {
                 number[r] = self.chords as u32;
                 self.chords += 1;
@@ -201,12 +201,4 @@ impl QuadLayout {
     pub fn n_irregular(&self) -> usize {
         self.nodes.iter().filter(|n| !n.is_regular()).count()
     }
-}
-
-fn root(parent: &mut [u32], mut a: u32) -> u32 {
-    while parent[a as usize] != a {
-        parent[a as usize] = parent[parent[a as usize] as usize];
-        a = parent[a as usize];
-    }
-    a
 }

@@ -25,9 +25,6 @@ const BEND: f64 = 0.3;
 const ANGLES: (f64, f64) = (0.5, 2.4);
 /// How much of a side's length is its quad's own; the rest is the mean of its patch.
 const OWN: f64 = 0.6;
-/// How much of the length aimed at is the one in the mesh that was given, which covers the surface evenly. Lengths
-/// that only follow the quads let these slide off a limb, since chords across it are shorter than the way around.
-const KEPT: f64 = 0.5;
 /// Longest step in mean sides of the quads around.
 const LONGEST: f64 = 1.0;
 
@@ -78,7 +75,7 @@ struct Aims {
     angles: Vec<DVec2>,
 }
 
-/// Rounds of the optimisation.
+/// Rounds of the optimisation. `kept` is how much of the side lengths aimed at are those at the start.
 ///
 /// # Errors
 ///
@@ -88,12 +85,12 @@ pub(super) fn optimise(
     ground: &Ground,
     around: &Around,
     rail: &mut Rail,
-    rounds: usize,
+    (rounds, kept): (usize, f64),
     progress: &Progress,
 ) -> Result<(), Cancelled> {
     for _ in 0..rounds {
         progress.check()?;
-        let aims = Aims::new(mesh, ground, around, rail);
+        let aims = Aims::new(mesh, ground, around, rail, kept);
         for colour in &around.colours {
             let moves: Vec<Option<Move>> =
                 colour.par_iter().map(|&v| Local { mesh, ground, around, rail, aims: &aims, v }.improve()).collect();
@@ -111,7 +108,7 @@ pub(super) fn optimise(
 }
 
 impl Aims {
-    fn new(mesh: &QuadMesh, ground: &Ground, around: &Around, rail: &Rail) -> Self {
+    fn new(mesh: &QuadMesh, ground: &Ground, around: &Around, rail: &Rail, kept: f64) -> Self {
         let at: Vec<DVec3> =
             mesh.positions.par_iter().zip(&mesh.base_face).map(|(&p, &f)| ground.normal(p, f)).collect();
         let normals =
@@ -125,13 +122,13 @@ impl Aims {
             };
             DVec2::from_angle(angle.clamp(ANGLES.0, ANGLES.1))
         });
-        Self { normals: normals.collect(), lengths: lengths(mesh, &around.given), angles: angles.collect() }
+        Self { normals: normals.collect(), lengths: lengths(mesh, &around.given, kept), angles: angles.collect() }
     }
 }
 
 /// The side lengths that quads should have: their own mean sides, drawn towards the mean of their patch and to the
 /// lengths `given` before the optimisation.
-fn lengths(mesh: &QuadMesh, given: &[[f64; 2]]) -> Vec<[f64; 2]> {
+fn lengths(mesh: &QuadMesh, given: &[[f64; 2]], kept: f64) -> Vec<[f64; 2]> {
     let n_patches = mesh.patch.iter().max().map_or(0, |&p| p as usize + 1);
     let mut sum = vec![[0.0; 3]; n_patches];
     let own: Vec<[f64; 2]> = mesh.quads.iter().map(|q| own_lengths(mesh, q)).collect();
@@ -142,8 +139,8 @@ fn lengths(mesh: &QuadMesh, given: &[[f64; 2]]) -> Vec<[f64; 2]> {
     }
     let mean = |p: u32, i: usize| sum[p as usize][i] / sum[p as usize][2];
     let drawn = |(s, &p): (&[f64; 2], &u32)| [0, 1].map(|i| (OWN * s[i] + (1.0 - OWN) * mean(p, i)).max(1e-12));
-    let kept = |(now, given): ([f64; 2], &[f64; 2])| [0, 1].map(|i| (1.0 - KEPT) * now[i] + KEPT * given[i]);
-    own.iter().zip(&mesh.patch).map(drawn).zip(given).map(kept).collect()
+    let blend = |(now, given): ([f64; 2], &[f64; 2])| [0, 1].map(|i| (1.0 - kept) * now[i] + kept * given[i]);
+    own.iter().zip(&mesh.patch).map(drawn).zip(given).map(blend).collect()
 }
 
 /// Mean lengths of the two pairs of opposite sides.

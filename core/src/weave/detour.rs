@@ -13,6 +13,7 @@ use super::session::Proposal;
 use crate::dual::{Arrangement, Cost, Mark, next};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
+use crate::union_find::UnionFind;
 
 /// Price of passing one curve, as a length: short detours are worth avoiding a crossing, long ones are not.
 const PASS: f64 = 0.05;
@@ -133,17 +134,14 @@ impl Tree {
         let dual_tree = |h: u32| {
             refined.twin(h).is_some_and(|t| self.entered[(t / 3) as usize] == h || self.entered[(h / 3) as usize] == t)
         };
-        let mut parent: Vec<u32> = (0..refined.n_vertices() as u32).collect();
+        let mut sets = UnionFind::new(refined.n_vertices());
         let mut open = Vec::new();
         // Boundary edges first: they join each boundary loop to one point.
         let boundary = (0..n_half).filter(|&h| refined.is_boundary(h));
         let inner = (0..n_half).filter(|&h| refined.twin(h).is_some_and(|t| h < t) && !dual_tree(h));
         for h in boundary.chain(inner) {
-            let (a, b) = (root(&mut parent, refined.origin(h)), root(&mut parent, refined.target(h)));
-            if a == b {
+            if !sets.join(refined.origin(h), refined.target(h)) {
                 open.push(h);
-            } else {
-                parent[a as usize] = b;
             }
         }
         let mut hash = vec![0; n_half as usize];
@@ -248,12 +246,4 @@ fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)
-}
-
-fn root(parent: &mut [u32], mut a: u32) -> u32 {
-    while parent[a as usize] != a {
-        parent[a as usize] = parent[parent[a as usize] as usize];
-        a = parent[a as usize];
-    }
-    a
 }

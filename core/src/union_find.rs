@@ -1,0 +1,42 @@
+//! Disjoint sets of numbers, joined step by step.
+
+/// Sets of the numbers from 0 to `n − 1`, each on its own at first.
+#[derive(Debug)]
+pub(crate) struct UnionFind {
+    parent: Vec<u32>,
+}
+
+impl UnionFind {
+    pub(crate) fn new(n: usize) -> Self {
+        Self { parent: (0..n as u32).collect() }
+    }
+
+    /// The number that stands for the set of `a`: the smallest of the set.
+    pub(crate) fn root(&mut self, mut a: u32) -> u32 {
+        while self.parent[a as usize] != a {
+            self.parent[a as usize] = self.parent[self.parent[a as usize] as usize];
+            a = self.parent[a as usize];
+        }
+        a
+    }
+
+    /// Joins the sets of `a` and `b`; returns whether they were two.
+    pub(crate) fn join(&mut self, a: u32, b: u32) -> bool {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+        a != b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joined_numbers_share_the_smallest() {
+        let mut sets = UnionFind::new(6);
+        assert!(sets.join(4, 2) && sets.join(5, 4));
+        assert!(!sets.join(2, 5));
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|a| sets.root(a)), [0, 1, 2, 3, 2, 2]);
+    }
+}

@@ -8,6 +8,7 @@ pub mod elastica;
 pub mod field;
 pub mod layout;
 pub mod mesh;
+pub mod param;
 pub mod progress;
 pub mod quad;
 pub mod solve;

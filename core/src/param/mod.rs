@@ -1,0 +1,8 @@
+//! Seamless maps of surfaces to the plane: two coordinates per triangle corner that continue across every edge up
+//! to quarter turns and translations, made to follow a cross field and to satisfy linear relations exactly.
+//!
+//! The room may use `mesh`, `field`, `solve` and `progress`; it does not know what the maps are for.
+
+mod seamless;
+
+pub use seamless::{Relation, SeamlessMap, Transition, turn};

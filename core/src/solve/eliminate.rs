@@ -92,22 +92,32 @@ struct Affine {
 ///
 /// See [`EliminationError`].
 pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, EliminationError> {
+    eliminate_in_turn(keep, constraints, 0)
+}
+
+/// As [`eliminate`], but the first `first` constraints before the others: if they do not contradict each other,
+/// a contradiction is one of the others.
+///
+/// # Errors
+///
+/// See [`EliminationError`].
+pub fn eliminate_in_turn(keep: &[u32], constraints: &[Constraint], first: usize) -> Result<Reduction, EliminationError> {
     let mut work = Work { known: vec![None; keep.len()], weight: keep.iter().map(|&k| u64::from(k)).collect() };
     let mut queue = BinaryHeap::with_capacity(constraints.len());
     for (i, c) in constraints.iter().enumerate() {
         if !c.rhs.is_finite() || c.terms.iter().any(|&(v, a)| v as usize >= keep.len() || !a.is_finite()) {
             return Err(EliminationError::Malformed { constraint: i });
         }
-        queue.push(Reverse((c.terms.len(), i)));
+        queue.push(Reverse((i >= first, c.terms.len(), i)));
     }
-    while let Some(Reverse((count, i))) = queue.pop() {
+    while let Some(Reverse((late, count, i))) = queue.pop() {
         let rest = work.substitute(&Affine { terms: constraints[i].terms.clone(), constant: -constraints[i].rhs });
         if rest.terms.is_empty() {
             if rest.constant.abs() > CONFLICT {
                 return Err(EliminationError::Conflict { constraint: i, rest: rest.constant });
             }
         } else if rest.terms.len() > count {
-            queue.push(Reverse((rest.terms.len(), i)));
+            queue.push(Reverse((late, rest.terms.len(), i)));
         } else {
             work.solve_for_one(&rest);
         }

@@ -6,15 +6,32 @@
 //!
 //! The room knows layouts and drawings, not how they came about.
 
+mod bending;
+mod descent;
+mod gradient;
+mod guides;
 mod lift;
+mod measures;
 mod net;
+mod relocate;
+mod shift;
+mod sizing;
+mod voronoi;
 mod working;
 
+pub use bending::face_curvature;
+pub use descent::{Optimizer, Settings, State, Surface};
+pub use guides::{Guide, feature_guides, shape_guides};
+pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use net::{Headings, Net, NetArc, NetNode, headings};
+pub use relocate::Hold;
+pub use sizing::{SizingSystem, rest_turns};
 
 use thiserror::Error;
 
+use crate::field::FieldError;
 use crate::mesh::{EdgeId, TriMeshError, VertexId};
+use crate::param::ParamError;
 use crate::progress::Cancelled;
 use crate::solve::SolveError;
 
@@ -53,6 +70,12 @@ pub enum EmbeddingError {
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The guiding field could not be computed.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The map could not be computed.
+    #[error(transparent)]
+    Param(#[from] ParamError),
     /// Stopped from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

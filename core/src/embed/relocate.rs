@@ -74,9 +74,7 @@ impl Ground<'_> {
         let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
         let mut corners: Vec<VertexId> = net.mesh.face_vertices(face).to_vec();
         corners.retain(|&v| v == from || (!taken.contains(&v) && !self.on_curve[v.index()]));
-        corners.sort_by(|a, b| {
-            self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place))
-        });
+        corners.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
         for to in corners {
             let Some(path) = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v)) else { continue };
             let old = net.mesh.position(from);
@@ -175,11 +173,8 @@ impl Ground<'_> {
 
     /// The curve edges at a vertex: a half-edge of each (leaving `v` where there is one) and the other end.
     fn along(&self, mesh: &TriMesh, v: VertexId) -> Vec<(HalfedgeId, VertexId)> {
-        let mut ends: Vec<_> = mesh
-            .outgoing(v)
-            .filter(|&h| self.curve[mesh.edge(h).index()])
-            .map(|h| (h, mesh.target(h)))
-            .collect();
+        let mut ends: Vec<_> =
+            mesh.outgoing(v).filter(|&h| self.curve[mesh.edge(h).index()]).map(|h| (h, mesh.target(h))).collect();
         if mesh.is_boundary_vertex(v) {
             let h = mesh.incoming_boundary(v);
             ends.push((h, mesh.origin(h)));

@@ -1,0 +1,174 @@
+//! The sizing field: by how much the map is to stretch at each triangle, so that the crosses so sized come from a
+//! map as nearly as possible.
+//!
+//! Unit crosses that turn are no gradients. Scaled by `e^φ`, the direction fields û and v̂ of a cross of angle θ are
+//! free of curl where `∇φ = J∇θ`, with J the quarter turn counter-clockwise: the curl of `e^φ û` is
+//! `e^φ (∇θ·û − ∇φ·v̂)`, that of `e^φ v̂` is `e^φ (∇θ·v̂ + ∇φ·û)`. Hence `∫ |∇φ − J∇θ|² + φ²/ℓ²` is minimised, with φ
+//! linear between vertices (Campen, section 6.4.3, after Ray et al., Periodic Global Parameterization). The
+//! derivative of J∇θ along an edge is what θ turns across it over the distance of the two centres, and the cotangent
+//! weight is that distance over the edge's length; so the right-hand side at a vertex is the sum of the turns about
+//! it. Inside the surface this is the curvature of the vertex less that of its singularity: φ depends on the
+//! singularities alone, not on the angles between them. The second term keeps φ near 0; without it φ grows towards
+//! singularities and along cones beyond use.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::field::Metric;
+use crate::mesh::{EdgeId, TriMesh};
+use crate::solve::{SolveError, SparseHermitian, SpdFactor, SpdSymbolic};
+
+/// Distance ℓ over which sizes go back to 1, in bounding-box diagonals.
+const REACH: f64 = 0.3;
+/// Largest size, and reciprocal of the smallest, relative to the mean.
+const MOST: f64 = 2.5;
+/// Rounds of clamping sizes and restoring their mean: three halve a remaining difference to below a percent.
+const ROUNDS: usize = 3;
+
+/// For each edge what the cross turns from the triangle of [`TriMesh::halfedge`] to that of its twin beyond the
+/// period jump, in `(-π, π]`; 0 on the boundary. Angles and jumps as in [`CrossField`](crate::field::CrossField).
+pub fn rest_turns(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: impl Fn(EdgeId) -> i32) -> Vec<f64> {
+    let rest = |e: EdgeId| {
+        let h = mesh.halfedge(e);
+        let Some(t) = mesh.twin(h) else { return 0.0 };
+        let turn = angle[mesh.face(t).index()] - angle[mesh.face(h).index()] - metric.transport(h, t);
+        let rest = turn - f64::from(jump(e)) * FRAC_PI_2;
+        rest - (rest / (2.0 * PI)).round() * 2.0 * PI
+    };
+    mesh.edges().map(rest).collect()
+}
+
+/// The factored system for sizes on one mesh; serves any cross field on it.
+#[derive(Debug, Clone)]
+pub struct SizingSystem {
+    matrix: SparseHermitian<f64>,
+    symbolic: SpdSymbolic,
+    factor: SpdFactor<f64>,
+}
+
+impl SizingSystem {
+    /// Sets up the system; `symbolic` from an earlier one on a mesh of the same triangles.
+    ///
+    /// # Errors
+    ///
+    /// See [`SolveError`].
+    pub fn new(mesh: &TriMesh, metric: &Metric, symbolic: Option<SpdSymbolic>) -> Result<Self, SolveError> {
+        let mut triplets = Vec::with_capacity(3 * mesh.n_halfedges());
+        for f in mesh.faces() {
+            let mass = metric.area(f) / 3.0 / (REACH * REACH);
+            for h in mesh.face_halfedges(f) {
+                let weight = 0.5 / metric.corner_angle(mesh.prev(h)).tan();
+                let (a, b) = (mesh.origin(h).0, mesh.target(h).0);
+                triplets.extend([(a, a, weight + mass), (b, b, weight), (a, b, -weight)]);
+            }
+        }
+        let matrix = SparseHermitian::from_triplets(mesh.n_vertices(), &triplets);
+        let symbolic = symbolic.map_or_else(|| SpdSymbolic::new(&matrix), Ok)?;
+        let factor = symbolic.factor(&matrix)?;
+        Ok(Self { matrix, symbolic, factor })
+    }
+
+    /// What the next system on the same triangles can reuse.
+    pub fn symbolic(&self) -> SpdSymbolic {
+        self.symbolic.clone()
+    }
+
+    /// The length that the gradients of both coordinates should have in each triangle; such that the map keeps the area
+    /// of the whole. `rest` as from [`rest_turns`].
+    ///
+    /// # Errors
+    ///
+    /// See [`SolveError`].
+    pub fn sizes(&self, mesh: &TriMesh, metric: &Metric, rest: &[f64]) -> Result<Vec<f64>, SolveError> {
+        let mut rhs = vec![0.0; mesh.n_vertices()];
+        for e in mesh.edges() {
+            let h = mesh.halfedge(e);
+            rhs[mesh.target(h).index()] += rest[e.index()];
+            rhs[mesh.origin(h).index()] -= rest[e.index()];
+        }
+        let phi = self.factor.solve(&self.matrix, &rhs)?;
+        let bound = MOST.ln();
+        let mut size: Vec<f64> =
+            mesh.faces().map(|f| mesh.face_vertices(f).iter().map(|v| phi[v.index()]).sum::<f64>() / 3.0).collect();
+        // Clamping shifts the mean and the mean what is clamped: a few rounds settle both.
+        for _ in 0..ROUNDS {
+            let (mut area, mut image) = (0.0, 0.0);
+            for (f, s) in mesh.faces().zip(&size) {
+                area += metric.area(f);
+                image += metric.area(f) * (2.0 * s).exp();
+            }
+            let shift = if image > 0.0 { 0.5 * (area / image).ln() } else { 0.0 };
+            for s in &mut size {
+                *s = (*s + shift).clamp(-bound, bound);
+            }
+        }
+        Ok(size.into_iter().map(f64::exp).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use crate::field::{CrossField, interpolate};
+    use crate::progress::Progress;
+    use crate::testing::grid;
+
+    /// Sum over inner regular vertices of the squared curl of both sized directions, over the area it is spread on.
+    fn curl(mesh: &TriMesh, metric: &Metric, field: &CrossField, size: &[f64]) -> f64 {
+        let mut total = 0.0;
+        for v in mesh.vertices().filter(|&v| !mesh.is_boundary_vertex(v)) {
+            if field.singularities.iter().any(|s| s.vertex == v) {
+                continue;
+            }
+            let (mut curl, mut area, mut branch) = (DVec2::ZERO, 0.0, 0);
+            for h in mesh.outgoing(v) {
+                let f = mesh.face(h);
+                let opposite = metric.layout(f)[(h.index() + 2) % 3] - metric.layout(f)[(h.index() + 1) % 3];
+                let u = DVec2::from_angle(field.angle[f.index()] + f64::from(branch) * FRAC_PI_2) * size[f.index()];
+                curl += 0.5 * DVec2::new(u.dot(opposite), u.perp().dot(opposite));
+                area += metric.area(f) / 3.0;
+                // The next triangle about the vertex lies across the edge that comes in.
+                branch -= field.jump_across(mesh, mesh.prev(h));
+            }
+            total += curl.length_squared() / area;
+        }
+        total
+    }
+
+    /// How much the sizes of a field of circles and rays lower its curl, on a ring lifted to a cone by `slope`.
+    fn gain(slope: f64) -> (f64, Vec<f64>, TriMesh) {
+        let mesh = grid(80, 12, [true, false], |u, v| {
+            let r = 0.25 + 0.1 * v;
+            DVec3::new(r * (TAU * u).cos(), -r * (TAU * u).sin(), slope * r)
+        });
+        let metric = Metric::new(&mesh);
+        let circles: Vec<bool> = mesh
+            .edges()
+            .map(|e| {
+                let [a, b] = mesh.edge_vertices(e).map(|v| mesh.position(v).truncate().length());
+                (a - b).abs() < 1e-9
+            })
+            .collect();
+        let field = interpolate(&mesh, &metric, &[], &circles, &Progress::new()).unwrap();
+        let rest = rest_turns(&mesh, &metric, &field.angle, |e| i32::from(field.jump[e.index()]));
+        let size = SizingSystem::new(&mesh, &metric, None).unwrap().sizes(&mesh, &metric, &rest).unwrap();
+        let before = curl(&mesh, &metric, &field, &vec![1.0; mesh.n_faces()]);
+        (before / curl(&mesh, &metric, &field, &size), size, mesh)
+    }
+
+    #[test]
+    fn circles_and_rays_become_a_gradient() {
+        for slope in [0.0, 1.0] {
+            let (gain, size, mesh) = gain(slope);
+            assert!(gain > 10.0, "{slope} {gain}");
+            // The gradient of ln r.
+            for f in mesh.faces() {
+                let r = mesh.face_vertices(f).map(|v| mesh.position(v).truncate().length()).iter().sum::<f64>() / 3.0;
+                assert!((size[f.index()] * r / 0.3 - 1.0).abs() < 0.05, "{r} {}", size[f.index()]);
+            }
+        }
+    }
+}

@@ -146,9 +146,11 @@ impl GuidedSystem {
             }
             lift = next;
         }
-        let square = |&(f, g, w, want): &(u32, u32, f64, f64)| w * (angle[g as usize] - angle[f as usize] - want).powi(2);
+        let square =
+            |&(f, g, w, want): &(u32, u32, f64, f64)| w * (angle[g as usize] - angle[f as usize] - want).powi(2);
         let energy = work.edges.iter().map(square).sum();
-        let branch = guides.iter().zip(&lift).map(|(g, &l)| (g.branch.unwrap_or(0) - follow(g, l)).rem_euclid(4)).collect();
+        let branch =
+            guides.iter().zip(&lift).map(|(g, &l)| (g.branch.unwrap_or(0) - follow(g, l)).rem_euclid(4)).collect();
         Ok(GuidedField { angle, branch, energy })
     }
 }
@@ -278,8 +280,7 @@ fn wanted(mesh: &TriMesh, metric: &Metric, jump: &[i32], h: HalfedgeId) -> f64 {
 /// boundary `3 − index` if the field is aligned with it. Around an inner vertex the angles cancel; at the boundary
 /// they count.
 pub fn indices(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<i32> {
-    let mut turn: Vec<f64> =
-        mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { PI } else { TAU }).collect();
+    let mut turn: Vec<f64> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { PI } else { TAU }).collect();
     for h in mesh.halfedges() {
         turn[mesh.origin(h).index()] -= metric.corner_angle(h);
         // Crossing the incoming spoke `h` leads counter-clockwise around its target.
@@ -325,3 +326,6 @@ pub fn cross_field(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32])
         singularities: mesh.vertices().zip(indices(mesh, metric, angle, jump)).filter_map(inner).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -132,8 +132,11 @@ fn lattices_are_mapped_without_error() {
         let field = lattice(&mesh, &metric);
         let list = nodes(&field);
         assert_eq!(list.len(), count);
-        assert!(indices(&mesh, &metric, &field.angle, &field.jump.iter().map(|&p| i32::from(p)).collect::<Vec<_>>())
-            .iter().all(|i| i.rem_euclid(4) <= 1 || i.rem_euclid(4) == 3));
+        assert!(
+            indices(&mesh, &metric, &field.angle, &field.jump.iter().map(|&p| i32::from(p)).collect::<Vec<_>>())
+                .iter()
+                .all(|i| i.rem_euclid(4) <= 1 || i.rem_euclid(4) == 3)
+        );
         let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
         let solution = solved(&mut system, &metric, &field);
         assert!(solution.energy < 1e-18, "{}", solution.energy);
@@ -143,10 +146,7 @@ fn lattices_are_mapped_without_error() {
             let axis = DVec2::from_angle(field.angle[f.index()]);
             assert!((u - axis).length() < 1e-9 && (v - axis.perp()).length() < 1e-9);
         }
-        assert!(matches!(
-            SeamlessSystem::new(&mesh, &field, &list[1..], &[]),
-            Err(ParamError::Topology { .. })
-        ));
+        assert!(matches!(SeamlessSystem::new(&mesh, &field, &list[1..], &[]), Err(ParamError::Topology { .. })));
     }
 }
 
@@ -304,7 +304,7 @@ fn a_reused_analysis_gives_the_same_bits() {
     system.set_relations(&mesh, &relations).unwrap();
     assert_eq!(solved(&mut system, &metric, &field).free, want.free);
     fresh.rebuild(&mesh, &field, &list, &relations).unwrap();
-    
+
     let again = solved(&mut fresh, &metric, &field);
     assert_eq!((again.free, again.map.uv), (want.free, want.map.uv));
 }

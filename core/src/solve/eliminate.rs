@@ -101,7 +101,11 @@ pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, 
 /// # Errors
 ///
 /// See [`EliminationError`].
-pub fn eliminate_in_turn(keep: &[u32], constraints: &[Constraint], first: usize) -> Result<Reduction, EliminationError> {
+pub fn eliminate_in_turn(
+    keep: &[u32],
+    constraints: &[Constraint],
+    first: usize,
+) -> Result<Reduction, EliminationError> {
     let mut work = Work { known: vec![None; keep.len()], weight: keep.iter().map(|&k| u64::from(k)).collect() };
     let mut queue = BinaryHeap::with_capacity(constraints.len());
     for (i, c) in constraints.iter().enumerate() {

@@ -118,13 +118,7 @@ impl StripMap {
     }
 }
 
-fn residual(
-    mesh: &TriMesh,
-    metric: &Metric,
-    field: &CrossField,
-    paths: &[EdgePath],
-    uv: &[[DVec2; 3]],
-) -> f64 {
+fn residual(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath], uv: &[[DVec2; 3]]) -> f64 {
     let mut worst: f64 = 0.0;
     for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
         for (h, c) in map::kept_coordinates(mesh, metric, field, *step, lean) {

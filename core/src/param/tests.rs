@@ -94,7 +94,8 @@ fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<Relation> {
         let [f, g] = [17 * i + 3, far + 29 * i].map(|k| FaceId::new(k % mesh.n_faces()));
         let crossed = chain(mesh, f, g);
         let from = SurfacePoint { face: f, weights: [0.2, 0.3, 0.5] };
-        let to = SurfacePoint { face: g, weights: if i % 2 == 0 { [0.0, 1.0, 0.0] } else { [0.5, 0.25, 0.25] } };
+        let to =
+            SurfacePoint { face: g, weights: if i.is_multiple_of(2) { [0.0, 1.0, 0.0] } else { [0.5, 0.25, 0.25] } };
         let mut r = Relation { from, crossed, to, axis: (i % 2) as u8, difference: 0.0 };
         r.difference = miss(mesh, map, &r) + 0.01 * (1 + i % 5) as f64;
         r

@@ -326,3 +326,6 @@ pub fn cross_field(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32])
         singularities: mesh.vertices().zip(indices(mesh, metric, angle, jump)).filter_map(inner).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests;

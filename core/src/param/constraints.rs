@@ -5,6 +5,7 @@
 //! `w_right = i^{-p} w_left + T`. A relation is carried along its chain: only where that crosses a cut coordinates
 //! change, by turns that are whole and translations that are sums of those of the cuts.
 
+use super::ParamError;
 use super::cut::Cut;
 use super::seamless::Relation;
 use crate::mesh::{HalfedgeId, TriMesh};
@@ -62,8 +63,14 @@ pub(super) fn seams(mesh: &TriMesh, cut: &Cut) -> Vec<Constraint> {
     out
 }
 
+/// The relations as constraints.
+pub(super) fn relations(mesh: &TriMesh, cut: &Cut, list: &[Relation]) -> Result<Vec<Constraint>, ParamError> {
+    let one = |(i, r)| relation(mesh, cut, r).ok_or(ParamError::Malformed { relation: i });
+    list.iter().enumerate().map(one).collect()
+}
+
 /// A relation as a constraint; `None` if it is malformed.
-pub(super) fn relation(mesh: &TriMesh, cut: &Cut, relation: &Relation) -> Option<Constraint> {
+fn relation(mesh: &TriMesh, cut: &Cut, relation: &Relation) -> Option<Constraint> {
     let Relation { from, crossed, to, axis, difference } = relation;
     let fine = |p: &SurfacePoint| p.face.index() < mesh.n_faces() && p.weights.iter().all(|w| w.is_finite());
     if *axis > 1 || !difference.is_finite() || !fine(from) || !fine(to) {

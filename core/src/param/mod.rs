@@ -3,6 +3,7 @@
 //!
 //! The room may use `mesh`, `surface`, `field`, `solve` and `progress`; it does not know what the maps are for.
 
+mod assembly;
 mod constraints;
 mod cut;
 mod objective;
@@ -63,7 +64,7 @@ pub enum ParamError {
     },
     /// The cuts could not be eliminated.
     #[error(transparent)]
-    Elimination(EliminationError),
+    Elimination(#[from] EliminationError),
     /// The map could not be solved for.
     #[error(transparent)]
     Solve(#[from] SolveError),

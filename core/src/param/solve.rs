@@ -1,24 +1,23 @@
 //! Solving for seamless maps.
 //!
-//! Three parts that change at different times: the topology (cut, wedges and relations, eliminated exactly to the
-//! affine expression of every corner in free variables) changes with the period jumps and the relations; the
-//! analysis of the matrix changes only if its pattern does; the values change with the geometry, the angles of the
-//! field and the objective. Where each triangle's share goes in the matrix is worked out with the topology, so that
-//! the assembly for new values is one pass over the triangles (Campen, Quad Layouts, section 6.4).
+//! Parts that change at different times: the cut with its seams changes with the period jumps; what is left is tied
+//! by the relations; after both have been eliminated exactly every corner is an affine expression of free variables.
+//! The analysis of the matrix changes only if its pattern does. The values change with the geometry, the angles of
+//! the field and the objective; where they go in the matrix has been worked out with the rest, so that the assembly
+//! is one pass over the triangles and one over the entries (Campen, Quad Layouts, section 6.4).
 
 use glam::DVec2;
 
+use super::assembly::Scatter;
 use super::constraints;
 use super::cut::Cut;
-use super::objective::{Objective, PAIRS, residuals};
+use super::objective::{Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
 use super::{ParamError, expect_length};
 use crate::field::{CrossField, Metric};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
-use crate::solve::{
-    Constraint, EliminationError, Reduction, SparseHermitian, SpdFactor, SpdSymbolic, eliminate_in_turn,
-};
+use crate::solve::{Constraint, EliminationError, Reduction, SparseHermitian, SpdFactor, SpdSymbolic, eliminate};
 
 /// The system of seamless maps of one topology.
 #[derive(Debug, Clone)]
@@ -26,12 +25,25 @@ pub struct SeamlessSystem {
     cut: Cut,
     /// Period jump of each edge, 0 to 3.
     jump: Vec<u8>,
-    /// Seams first, then one for each relation.
-    constraints: Vec<Constraint>,
-    n_seams: usize,
-    reduction: Reduction,
-    scatter: Scatter,
+    /// What the seams leave of all variables.
+    seams: Reduction,
+    /// How the shares of triangles make the matrix of what the seams leave.
+    shares: Scatter,
+    /// One constraint of all variables for each relation.
+    relations: Vec<Constraint>,
+    tied: Tied,
     symbolic: Option<SpdSymbolic>,
+}
+
+/// What follows from the relations.
+#[derive(Debug, Clone)]
+struct Tied {
+    /// What they leave of what the seams leave.
+    ties: Reduction,
+    /// What both leave of all variables.
+    reduction: Reduction,
+    /// How the matrix of what the seams leave makes that of the free variables.
+    fold: Scatter,
 }
 
 /// A coordinate of a corner as an affine expression of the free variables: `sign · (Σ terms + constant)`.
@@ -86,13 +98,12 @@ impl SeamlessSystem {
     ) -> Result<Self, ParamError> {
         expect_length("the list of period jumps", field.jump.len(), mesh.n_edges())?;
         let cut = Cut::new(mesh, field, nodes)?;
-        let mut constraints = constraints::seams(mesh, &cut);
-        let n_seams = constraints.len();
-        extend(mesh, &cut, relations, &mut constraints)?;
-        let reduction = reduce(&cut, &constraints, n_seams)?;
-        let scatter = Scatter::new(&cut, &reduction);
+        let seams = eliminate(&constraints::keep(&cut), &constraints::seams(mesh, &cut))?;
+        let shares = Scatter::of_triangles(&cut, &seams);
+        let relations = constraints::relations(mesh, &cut, relations)?;
+        let tied = Tied::new(&seams, &shares, &relations)?;
         let jump = field.jump.iter().map(|p| p.rem_euclid(4) as u8).collect();
-        Ok(Self { cut, jump, constraints, n_seams, reduction, scatter, symbolic: None })
+        Ok(Self { cut, jump, seams, shares, relations, tied, symbolic: None })
     }
 
     /// Sets up anew as [`Self::new`] does, but keeps the analysis of the matrix if its pattern is the same.
@@ -108,7 +119,7 @@ impl SeamlessSystem {
         relations: &[Relation],
     ) -> Result<(), ParamError> {
         let new = Self::new(mesh, field, nodes, relations)?;
-        let symbolic = self.symbolic.take().filter(|_| new.scatter.zero.same_pattern(&self.scatter.zero));
+        let symbolic = self.symbolic.take().filter(|_| new.tied.same_pattern(&self.tied));
         *self = Self { symbolic, ..new };
         Ok(())
     }
@@ -119,14 +130,12 @@ impl SeamlessSystem {
     ///
     /// [`ParamError::Malformed`] or [`ParamError::Conflict`]; the system then stays as it was.
     pub fn set_relations(&mut self, mesh: &TriMesh, relations: &[Relation]) -> Result<(), ParamError> {
-        let mut constraints = self.constraints[..self.n_seams].to_vec();
-        extend(mesh, &self.cut, relations, &mut constraints)?;
-        let reduction = reduce(&self.cut, &constraints, self.n_seams)?;
-        let scatter = Scatter::new(&self.cut, &reduction);
-        if !scatter.zero.same_pattern(&self.scatter.zero) {
+        let relations = constraints::relations(mesh, &self.cut, relations)?;
+        let tied = Tied::new(&self.seams, &self.shares, &relations)?;
+        if !tied.same_pattern(&self.tied) {
             self.symbolic = None;
         }
-        (self.constraints, self.reduction, self.scatter) = (constraints, reduction, scatter);
+        (self.relations, self.tied) = (relations, tied);
         Ok(())
     }
 
@@ -137,14 +146,13 @@ impl SeamlessSystem {
     /// [`ParamError::WrongLength`], [`ParamError::Malformed`] or [`ParamError::Conflict`]; the system then stays as
     /// it was.
     pub fn set_differences(&mut self, differences: &[f64]) -> Result<(), ParamError> {
-        expect_length("the list of differences", differences.len(), self.constraints.len() - self.n_seams)?;
-        let mut constraints = self.constraints.clone();
-        for (c, &difference) in constraints[self.n_seams..].iter_mut().zip(differences) {
-            c.rhs = difference;
-        }
+        expect_length("the list of differences", differences.len(), self.relations.len())?;
+        let changed = |(c, &rhs): (&Constraint, &f64)| Constraint { rhs, ..c.clone() };
+        let relations: Vec<_> = self.relations.iter().zip(differences).map(changed).collect();
         // The order of elimination does not depend on constants, hence neither does what the matrix is made of.
-        self.reduction = reduce(&self.cut, &constraints, self.n_seams)?;
-        self.constraints = constraints;
+        self.tied.ties = tie(&self.seams, &relations)?;
+        self.tied.reduction = self.seams.then(&self.tied.ties);
+        self.relations = relations;
         Ok(())
     }
 
@@ -155,13 +163,13 @@ impl SeamlessSystem {
 
     /// Number of free variables.
     pub fn n_free(&self) -> usize {
-        self.reduction.n_free()
+        self.tied.reduction.n_free()
     }
 
     /// Coordinate `axis` (0: u, 1: v) of the origin of `h` in the frame of the field in its triangle.
     pub fn coordinate(&self, h: HalfedgeId, axis: u32) -> Coordinate<'_> {
         let (variable, sign) = constraints::corner(&self.cut, h, axis);
-        let (terms, constant) = self.reduction.expression(variable as usize);
+        let (terms, constant) = self.tied.reduction.expression(variable as usize);
         Coordinate { sign, terms, constant }
     }
 
@@ -183,34 +191,21 @@ impl SeamlessSystem {
         if let Some(e) = (0..self.jump.len()).find(|&e| self.jump[e] != field.jump[e].rem_euclid(4) as u8) {
             return Err(ParamError::OtherJump { edge: EdgeId::new(e) });
         }
-        let mut matrix = self.scatter.zero.clone();
-        let mut rhs = vec![0.0; self.n_free()];
-        let mut shares = self.scatter.shares.iter();
-        for (f, &count) in self.scatter.count.iter().enumerate() {
+        let mut open = self.shares.zero.clone();
+        let mut load = vec![0.0; self.seams.n_free()];
+        for f in 0..n_faces {
             let local = objective.local(metric, field.angle[f], FaceId::new(f));
-            let values = matrix.values_mut();
-            for share in shares.by_ref().take(count as usize) {
-                let k = usize::from(share.pair);
-                values[share.slot as usize] += share.factor * local.stiffness[k / 6][k % 6];
-            }
-            for (axis, (stiffness, load)) in local.stiffness.iter().zip(&local.load).enumerate() {
-                let corners = [0, 1, 2].map(|i| self.coordinate(HalfedgeId::new(3 * f + i), axis as u32));
-                // What constants contribute is known and goes to the right.
-                let mut load = *load;
-                for (&(i, j), k) in PAIRS.iter().zip(stiffness) {
-                    load[i] -= k * corners[j].sign * corners[j].constant;
-                    if i != j {
-                        load[j] -= k * corners[i].sign * corners[i].constant;
-                    }
-                }
-                for (corner, load) in corners.iter().zip(load) {
-                    for &(x, c) in corner.terms {
-                        rhs[x as usize] += corner.sign * c * load;
+            self.shares.add(f, local.stiffness.as_flattened(), &mut open);
+            for (axis, shares) in (0..).zip(local.load) {
+                for (i, share) in shares.into_iter().enumerate() {
+                    let (variable, sign) = constraints::corner(&self.cut, HalfedgeId::new(3 * f + i), axis);
+                    for &(z, c) in self.seams.expression(variable as usize).0 {
+                        load[z as usize] += sign * c * share;
                     }
                 }
             }
         }
-        Ok((matrix, rhs))
+        Ok(self.tied.fold(&open, load))
     }
 
     /// Factors a matrix of this system; the first time its pattern is analysed.
@@ -252,7 +247,7 @@ impl SeamlessSystem {
 
     /// The map where the free variables are `y`.
     pub fn map(&self, y: &[f64]) -> SeamlessMap {
-        let x = self.reduction.expand(y);
+        let x = self.tied.reduction.expand(y);
         let at = |h: usize| {
             let [u, v] = [0, 1].map(|axis| {
                 let (variable, sign) = constraints::corner(&self.cut, HalfedgeId::new(h), axis);
@@ -265,79 +260,57 @@ impl SeamlessSystem {
     }
 }
 
-fn extend(mesh: &TriMesh, cut: &Cut, relations: &[Relation], out: &mut Vec<Constraint>) -> Result<(), ParamError> {
-    for (i, r) in relations.iter().enumerate() {
-        out.push(constraints::relation(mesh, cut, r).ok_or(ParamError::Malformed { relation: i })?);
+impl Tied {
+    fn new(seams: &Reduction, shares: &Scatter, relations: &[Constraint]) -> Result<Self, ParamError> {
+        let ties = tie(seams, relations)?;
+        let fold = Scatter::of_matrix(&shares.zero, &ties);
+        Ok(Self { reduction: seams.then(&ties), ties, fold })
     }
-    Ok(())
-}
 
-/// Eliminates the seams, which never contradict each other, and then the relations.
-fn reduce(cut: &Cut, constraints: &[Constraint], n_seams: usize) -> Result<Reduction, ParamError> {
-    eliminate_in_turn(&constraints::keep(cut), constraints, n_seams).map_err(|error| match error {
-        EliminationError::Conflict { constraint, rest } if constraint >= n_seams => {
-            ParamError::Conflict { relation: constraint - n_seams, rest }
+    fn same_pattern(&self, other: &Self) -> bool {
+        self.fold.zero.same_pattern(&other.fold.zero)
+    }
+
+    /// The system of the free variables from that of what the seams leave.
+    fn fold(&self, open: &SparseHermitian<f64>, mut load: Vec<f64>) -> (SparseHermitian<f64>, Vec<f64>) {
+        let mut matrix = self.fold.zero.clone();
+        for (k, (_, _, value)) in open.entries().enumerate() {
+            self.fold.add(k, &[value], &mut matrix);
         }
-        EliminationError::Malformed { constraint } if constraint >= n_seams => {
-            ParamError::Malformed { relation: constraint - n_seams }
-        }
-        other => ParamError::Elimination(other),
-    })
-}
-
-/// Where each triangle's share of the matrix goes.
-#[derive(Debug, Clone)]
-struct Scatter {
-    /// The matrix without values.
-    zero: SparseHermitian<f64>,
-    /// The shares of all triangles one after the other.
-    shares: Vec<Share>,
-    /// How many of them each triangle has.
-    count: Vec<u32>,
-}
-
-/// One local entry times a factor, to be added to one entry of the matrix.
-#[derive(Debug, Clone, Copy)]
-struct Share {
-    slot: u32,
-    /// Pair of corners as in [`PAIRS`], those of v after those of u.
-    pair: u8,
-    factor: f64,
-}
-
-impl Scatter {
-    fn new(cut: &Cut, reduction: &Reduction) -> Self {
-        let n_faces = cut.turn.len();
-        let mut at: Vec<(u32, u32)> = Vec::with_capacity(13 * n_faces);
-        let mut shares: Vec<Share> = Vec::with_capacity(13 * n_faces);
-        let mut count = Vec::with_capacity(n_faces);
-        for f in 0..n_faces {
-            let before = shares.len();
-            for axis in 0..2 {
-                let corners = [0, 1, 2].map(|i| {
-                    let (variable, sign) = constraints::corner(cut, HalfedgeId::new(3 * f + i), axis);
-                    (reduction.expression(variable as usize).0, sign)
-                });
-                for (pair, &(i, j)) in (6 * axis as u8..).zip(&PAIRS) {
-                    let ((row, s), (column, t)) = (corners[i], corners[j]);
-                    for (a, &(x, c)) in row.iter().enumerate() {
-                        // A pair of one corner with itself meets each pair of terms twice, of which one is stored;
-                        // of two corners, one variable meets itself twice.
-                        let from = if i == j { a } else { 0 };
-                        for &(y, d) in &column[from..] {
-                            let twice = if i != j && x == y { 2.0 } else { 1.0 };
-                            at.push((x, y));
-                            shares.push(Share { slot: 0, pair, factor: twice * s * t * c * d });
-                        }
-                    }
-                }
+        // What constants contribute is known and goes to the right.
+        let constants: Vec<f64> = (0..load.len()).map(|z| self.ties.expression(z).1).collect();
+        if constants.iter().any(|&d| d != 0.0) {
+            for (b, known) in load.iter_mut().zip(open.multiply(&constants)) {
+                *b -= known;
             }
-            count.push((shares.len() - before) as u32);
         }
-        let (zero, slot) = SparseHermitian::zero(reduction.n_free(), at.len(), || at.iter().copied());
-        for (share, slot) in shares.iter_mut().zip(slot) {
-            share.slot = slot;
+        let mut rhs = vec![0.0; matrix.n()];
+        for (z, b) in load.into_iter().enumerate() {
+            for &(y, c) in self.ties.expression(z).0 {
+                rhs[y as usize] += c * b;
+            }
         }
-        Self { zero, shares, count }
+        (matrix, rhs)
     }
+}
+
+/// Eliminates the relations among what the seams leave. That is done apart, as the seams never contradict each
+/// other and change less often, and as expressions grow long: the matrix is folded as a whole, not triangle by
+/// triangle.
+fn tie(seams: &Reduction, relations: &[Constraint]) -> Result<Reduction, ParamError> {
+    let mut keep = vec![0; seams.n_free()];
+    for x in 0..seams.n_variables() {
+        for &(z, _) in seams.expression(x).0 {
+            keep[z as usize] += 1;
+        }
+    }
+    let substituted = |c: &Constraint| {
+        let of = |&(x, a): &(u32, f64)| seams.expression(x as usize).0.iter().map(move |&(z, c)| (z, a * c));
+        Constraint { terms: c.terms.iter().flat_map(of).collect(), rhs: c.rhs }
+    };
+    let relations: Vec<Constraint> = relations.iter().map(substituted).collect();
+    eliminate(&keep, &relations).map_err(|error| match error {
+        EliminationError::Conflict { constraint, rest } => ParamError::Conflict { relation: constraint, rest },
+        EliminationError::Malformed { constraint } => ParamError::Malformed { relation: constraint },
+    })
 }

@@ -67,6 +67,35 @@ impl Reduction {
         (&self.terms[self.start[x] as usize..self.start[x + 1] as usize], self.constant[x])
     }
 
+    /// Number of variables.
+    pub fn n_variables(&self) -> usize {
+        self.constant.len()
+    }
+
+    /// The same variables in terms of the free ones of `next`, whose variables are the free ones here.
+    pub fn then(&self, next: &Self) -> Self {
+        let n = self.constant.len();
+        let mut out = Self {
+            n_free: next.n_free,
+            start: vec![0],
+            terms: Vec::with_capacity(2 * n),
+            constant: Vec::with_capacity(n),
+        };
+        for x in 0..n {
+            let (terms, mut constant) = self.expression(x);
+            let mut all = Vec::with_capacity(terms.len());
+            for &(z, a) in terms {
+                let (inner, d) = next.expression(z as usize);
+                all.extend(inner.iter().map(|&(y, b)| (y, a * b)));
+                constant += a * d;
+            }
+            out.terms.extend(collect(all));
+            out.start.push(out.terms.len() as u32);
+            out.constant.push(constant);
+        }
+        out
+    }
+
     /// The values of all variables where the free ones are `y`.
     pub fn expand(&self, y: &[f64]) -> Vec<f64> {
         (0..self.constant.len())
@@ -92,36 +121,22 @@ struct Affine {
 ///
 /// See [`EliminationError`].
 pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, EliminationError> {
-    eliminate_in_turn(keep, constraints, 0)
-}
-
-/// As [`eliminate`], but the first `first` constraints before the others: if they do not contradict each other,
-/// a contradiction is one of the others.
-///
-/// # Errors
-///
-/// See [`EliminationError`].
-pub fn eliminate_in_turn(
-    keep: &[u32],
-    constraints: &[Constraint],
-    first: usize,
-) -> Result<Reduction, EliminationError> {
     let mut work = Work { known: vec![None; keep.len()], weight: keep.iter().map(|&k| u64::from(k)).collect() };
     let mut queue = BinaryHeap::with_capacity(constraints.len());
     for (i, c) in constraints.iter().enumerate() {
         if !c.rhs.is_finite() || c.terms.iter().any(|&(v, a)| v as usize >= keep.len() || !a.is_finite()) {
             return Err(EliminationError::Malformed { constraint: i });
         }
-        queue.push(Reverse((i >= first, c.terms.len(), i)));
+        queue.push(Reverse((c.terms.len(), i)));
     }
-    while let Some(Reverse((late, count, i))) = queue.pop() {
+    while let Some(Reverse((count, i))) = queue.pop() {
         let rest = work.substitute(&Affine { terms: constraints[i].terms.clone(), constant: -constraints[i].rhs });
         if rest.terms.is_empty() {
             if rest.constant.abs() > CONFLICT {
                 return Err(EliminationError::Conflict { constraint: i, rest: rest.constant });
             }
         } else if rest.terms.len() > count {
-            queue.push(Reverse((late, rest.terms.len(), i)));
+            queue.push(Reverse((rest.terms.len(), i)));
         } else {
             work.solve_for_one(&rest);
         }

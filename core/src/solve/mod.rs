@@ -5,5 +5,5 @@
 mod eliminate;
 mod spd;
 
-pub use eliminate::{Constraint, EliminationError, Reduction, eliminate, eliminate_in_turn};
+pub use eliminate::{Constraint, EliminationError, Reduction, eliminate};
 pub use spd::{Scalar, SolveError, SparseHermitian, SpdFactor, SpdSymbolic, c64};

@@ -140,6 +140,12 @@ impl<T: Scalar> SparseHermitian<T> {
         (matrix, slot)
     }
 
+    /// Row, column and value of the stored entries, in the order of [`Self::values_mut`].
+    pub fn entries(&self) -> impl Iterator<Item = (u32, u32, T)> {
+        let column = |c: usize| self.col_start[c] as usize..self.col_start[c + 1] as usize;
+        (0..self.n()).flat_map(move |c| column(c).map(move |k| (self.row[k], c as u32, self.value[k])))
+    }
+
     /// The values of the stored entries.
     pub fn values_mut(&mut self) -> &mut [T] {
         &mut self.value

@@ -4,5 +4,7 @@
 //! The room may use `mesh`, `field`, `solve` and `progress`; it does not know what the maps are for.
 
 mod seamless;
+mod unfold;
 
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
+pub use unfold::{Fold, FoldReason, OrientationProblem, OrientedTriangle, Unfolded, unfold};

@@ -11,6 +11,7 @@ mod seamless;
 mod solve;
 #[cfg(test)]
 mod tests;
+mod unfold;
 
 use thiserror::Error;
 
@@ -18,6 +19,7 @@ pub use cut::{Cut, CutPath};
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};
+pub use unfold::{Fold, FoldReason, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 
 use crate::mesh::EdgeId;
 use crate::progress::Cancelled;

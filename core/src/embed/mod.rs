@@ -1,0 +1,14 @@
+//! The embedding of a layout that a seamless map of the surface gives: arcs are isolines, patches rectangles.
+
+mod march;
+mod patches;
+mod trace;
+mod weld;
+
+pub use patches::{RectangleError, map_rectangles};
+pub use trace::{ArcChain, TraceError, Traced, preview_arcs, trace_arcs};
+
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod tests;

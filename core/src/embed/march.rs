@@ -134,6 +134,15 @@ enum At {
     Leaving(HalfedgeId),
 }
 
+/// The node at each vertex of a mesh, or `u32::MAX`.
+pub(super) fn nodes_at(mesh: &TriMesh, node_vertex: &[VertexId]) -> Vec<u32> {
+    let mut node = vec![u32::MAX; mesh.n_vertices()];
+    for (n, v) in (0u32..).zip(node_vertex) {
+        node[v.index()] = n;
+    }
+    node
+}
+
 /// Distances below this are rounding of `map`.
 pub(super) fn exactness(map: &SeamlessMap) -> f64 {
     let area: f64 = map.uv.iter().map(|[a, b, c]| 0.5 * (*b - *a).perp_dot(*c - *a).abs()).sum();
@@ -250,8 +259,8 @@ impl Isolines<'_> {
     }
 
     /// Which of `slots` at the node where a line ends is the line turned round.
-    pub fn arrival(&self, marched: &Marched, slots: &[Slot]) -> Option<usize> {
-        let (corner, line) = match *marched.steps.as_slice() {
+    pub fn arrival(&self, steps: &[Step], slots: &[Slot]) -> Option<usize> {
+        let (corner, line) = match *steps {
             [.., Step::Edge(h, line), Step::Vertex(..)] => {
                 (self.mesh.prev(self.mesh.twin(h)?), line.seen(&self.map.transition(self.mesh, h)?))
             }
@@ -263,20 +272,27 @@ impl Isolines<'_> {
 
     /// Marches from a slot to the first node, no farther than `limit`.
     pub fn march(&self, slot: Slot, limit: f64) -> Result<Marched, Stop> {
+        let mut steps = Vec::new();
+        let length = self.march_into(&mut steps, slot, limit)?;
+        Ok(Marched { steps, length })
+    }
+
+    /// The same; the points met are added to `steps`, also where there is no node at the end. Returns the length.
+    pub fn march_into(&self, steps: &mut Vec<Step>, slot: Slot, limit: f64) -> Result<f64, Stop> {
         let mesh = self.mesh;
         let along_boundary = slot.exit == Exit::Back || slot.exit == Exit::Along && mesh.twin(slot.corner).is_none();
         let mut line = Line { start: self.uv(slot.corner), heading: slot.heading };
-        let mut steps = vec![Step::Vertex(slot.corner, line)];
+        steps.push(Step::Vertex(slot.corner, line));
         let mut at = self.leave(slot.corner, slot.exit);
         // A line meets no side of a triangle twice but at fold-overs, where it might go round for ever.
         for _ in 0..mesh.n_halfedges() {
             match at {
                 At::Vertex(corner) => {
                     let (v, length) = (mesh.origin(corner), line.along(self.uv(corner)));
-                    drop_crossings_at(mesh, &mut steps, v);
+                    drop_crossings_at(mesh, steps, v);
                     steps.push(Step::Vertex(corner, line));
                     if self.node[v.index()] != u32::MAX {
-                        return Ok(Marched { steps, length });
+                        return Ok(length);
                     }
                     if length > limit {
                         return Err(Stop::Length(mesh.face(corner)));

@@ -88,7 +88,7 @@ fn map_rectangle(
     let (mut uv, torn) = one_chart(traced, &piece.mesh, &faces);
     let (size, bent) = straighten(&mut uv, &sides);
     let deviation = torn.max(bent);
-    if !(deviation <= ROUNDING * (size.x + size.y)) {
+    if deviation.is_nan() || deviation > ROUNDING * (size.x + size.y) {
         return Err(RectangleError::NotRectangle { patch, size, deviation });
     }
     let flipped = crate::layout::flipped(&piece.mesh, &uv);

@@ -278,7 +278,7 @@ pub(crate) fn cube_map(n: i32, shake: f64, along: DVec2) -> (TriMesh, SeamlessMa
             let p = *p * 5.0;
             // Inside a side in its plane, on an edge along it; half-way points are kept for nodes.
             let half = p.to_array().iter().all(|x| ((2.0 * x).round() - 2.0 * x).abs() < 1e-9);
-            let by = p.to_array().map(|x| if half || x < 1e-9 || x > 1.0 - 1e-9 { 0.0 } else { shake * step });
+            let by = p.to_array().map(|x| if half || !(1e-9..=1.0 - 1e-9).contains(&x) { 0.0 } else { shake * step });
             p + DVec3::from_array(by) * DVec3::new(noise.next(), noise.next(), noise.next())
         })
         .collect();

@@ -2,9 +2,9 @@ use glam::{DVec2, DVec3};
 
 use super::samples::{self, Sample};
 use super::trace::{TraceError, Traced, preview_arcs, trace_arcs};
-use super::{RectangleError, map_rectangles};
+use super::{Emerged, RectangleError, emerge, map_rectangles};
 use crate::layout::PatchMap;
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::quad::{QuadMesh, refine};
 
@@ -248,4 +248,128 @@ fn a_patch_that_is_no_rectangle_is_an_error() {
     let traced = trace(&s).unwrap();
     let error = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap_err();
     assert!(matches!(error, RectangleError::NotRectangle { patch: 0, .. }), "{error}");
+}
+
+/// The base complex of a sample with some of its nodes, checked.
+fn emerged(mesh: &TriMesh, map: &crate::param::SeamlessMap, nodes: &[VertexId]) -> Emerged {
+    let e = emerge(mesh, map, nodes, 100.0).unwrap();
+    let maps = map_rectangles(&e.layout, &e.traced, &Progress::new()).unwrap();
+    assert!(maps.iter().all(|m| m.flipped == 0));
+    let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
+    assert!((parts - area(mesh)).abs() < 1e-9);
+    let quads = refine(&e.layout, &e.traced.embedding, &maps, &vec![4; e.layout.chords]);
+    assert_eq!(euler(&quads), mesh.euler_characteristic());
+    e
+}
+
+/// The patches as cycles of nodes, each from its least corner on.
+fn cycles(layout: &crate::layout::QuadLayout) -> Vec<[u32; 4]> {
+    let least = |c: [u32; 4]| (0..4).map(|i| [0, 1, 2, 3].map(|k| c[(i + k) % 4])).min().unwrap();
+    let mut list: Vec<[u32; 4]> = layout.patches.iter().map(|p| least(p.corners)).collect();
+    list.sort_unstable();
+    list
+}
+
+#[test]
+fn with_all_nodes_the_layout_itself_emerges() {
+    let mut list = vec![samples::slanted_torus(2, 0.0), samples::slanted_torus(3, 0.3), samples::cube(4, 2, 0.3)];
+    list.extend([samples::square(12, 3, 0.3), samples::square(8, 1, 0.0), samples::cone(5, 4, 0.2)]);
+    for s in list {
+        let e = emerged(&s.mesh, &s.map, &s.nodes);
+        assert_eq!(cycles(&e.layout), cycles(&s.layout));
+        assert_eq!(e.layout.nodes, s.layout.nodes);
+        assert_eq!((e.layout.arcs.len(), e.layout.chords), (s.layout.arcs.len(), s.layout.chords));
+    }
+}
+
+#[test]
+fn regular_nodes_emerge_where_isolines_cross_or_end() {
+    for shake in [0.0, 0.2] {
+        let s = samples::cone(3, 4, shake);
+        let irregular: Vec<_> = s.nodes.iter().zip(&s.layout.nodes).filter(|(_, n)| !n.is_regular()).collect();
+        let vertices: Vec<_> = irregular.into_iter().map(|(&v, _)| v).collect();
+        assert_eq!(vertices.len(), 4);
+        let e = emerged(&s.mesh, &s.map, &vertices);
+        assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (7, 9, 3));
+
+        let s = samples::cube(6, 2, shake);
+        let vertices: Vec<_> =
+            s.nodes.iter().zip(&s.layout.nodes).filter(|(_, n)| !n.is_regular()).map(|(&v, _)| v).collect();
+        let e = emerged(&s.mesh, &s.map, &vertices);
+        assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (8, 12, 6));
+    }
+}
+
+#[test]
+fn a_slanted_cube_has_the_lattice_for_its_base_complex() {
+    // Slanted by the direction (a, b), a cube's sides are squares over the lattice that hold a² + b² cells each.
+    for (a, b) in [(1, 1), (2, 1), (3, 1), (3, 2)] {
+        for (n, shake) in [(6, 0.0), (7, 0.3), (3, 0.2)] {
+            let along = DVec2::new(f64::from(a), f64::from(b)).normalize();
+            let (mesh, map) = samples::cube_map(n, shake, along);
+            let corners: Vec<_> = mesh
+                .vertices()
+                .filter(|&v| mesh.position(v).to_array().iter().all(|x| (x - x.round()).abs() < 1e-9))
+                .collect();
+            assert_eq!(corners.len(), 8);
+            let e = emerged(&mesh, &map, &corners);
+            assert_eq!(e.layout.n_irregular(), 8);
+            let patches = 6 * (a * a + b * b) as usize;
+            assert_eq!((e.layout.nodes.len(), e.layout.patches.len()), (patches + 2, patches));
+        }
+    }
+}
+
+/// The sample of a layout whose arcs are edges of the mesh; chains run beside them, on the left.
+fn beside(e: &Emerged) -> Sample {
+    let (mesh, map) = (e.traced.mesh.clone(), e.traced.map.clone());
+    let nodes = e.traced.embedding.nodes.iter().map(|&v| VertexId(v)).collect();
+    let mut chains = Vec::new();
+    for path in &e.traced.embedding.arcs {
+        let leaving =
+            |i: usize| mesh.outgoing(VertexId(path[i])).find(|&h| mesh.target(h) == VertexId(path[i + 1])).unwrap();
+        let start = leaving(0);
+        let (mut h, mut crossed) = (start, Vec::new());
+        for &next in &path[2..] {
+            h = mesh.next(h);
+            while mesh.target(h) != VertexId(next) {
+                crossed.push(h);
+                h = mesh.next(mesh.twin(h).unwrap());
+            }
+        }
+        let way = map.uv[start.index() / 3][(start.index() + 1) % 3] - map.uv[start.index() / 3][start.index() % 3];
+        let along = |k: u8| crate::param::turn(way, -i32::from(k)).x;
+        let heading = (0..4u8).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap();
+        chains.push(samples::OwnedChain { start, crossed, end: mesh.next(h), heading });
+    }
+    Sample { mesh, map, layout: e.layout.clone(), nodes, chains }
+}
+
+#[test]
+fn timing() {
+    let (a, b) = (5.0, 4.0);
+    let (mesh, map) = samples::cube_map(48, 0.3, DVec2::new(a, b).normalize());
+    let corners: Vec<_> =
+        mesh.vertices().filter(|&v| mesh.position(v).to_array().iter().all(|x| (x - x.round()).abs() < 1e-9)).collect();
+    let t = std::time::Instant::now();
+    let e = emerge(&mesh, &map, &corners, 100.0).unwrap();
+    println!("emerge {:?}: {} faces", t.elapsed(), mesh.n_faces());
+    let s = beside(&e);
+    println!("{} arcs {} faces", s.layout.arcs.len(), s.mesh.n_faces());
+    let t = std::time::Instant::now();
+    trace(&s).unwrap();
+    println!("trace {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    let p = preview_arcs(&s.mesh, &s.map, &s.nodes, &s.chains());
+    println!("preview {:?} {}", t.elapsed(), p.iter().flatten().count());
+    let s2 = samples::slanted_torus(24, 0.3);
+    let t = std::time::Instant::now();
+    let p = preview_arcs(&s2.mesh, &s2.map, &s2.nodes, &s2.chains());
+    println!("preview {:?} {}", t.elapsed(), p.iter().flatten().map(Vec::len).sum::<usize>());
+    let t = std::time::Instant::now();
+    let x = trace(&s2).unwrap();
+    println!("trace {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    map_rectangles(&s2.layout, &x, &Progress::new()).unwrap();
+    println!("rect {:?}", t.elapsed());
 }

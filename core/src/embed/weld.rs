@@ -3,6 +3,8 @@
 //! Every triangle is cut along the pieces of arcs inside it into polygons, and these into triangles. Whether two
 //! arcs cross is read off the order of their ends around the triangle, so it cannot go unnoticed.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec2, DVec3};
 
 use super::trace::TraceError;
@@ -48,31 +50,36 @@ pub(super) struct Welded {
     pub paths: Vec<Vec<u32>>,
 }
 
+/// What it means that two arcs meet other than at their ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meeting {
+    /// It is an error.
+    Wrong,
+    /// Their paths have a vertex in common there.
+    Vertex,
+}
+
 /// Refines `mesh` along `arcs`.
-pub(super) fn weld(mesh: &TriMesh, map: &SeamlessMap, arcs: &[Vec<Point>]) -> Result<Welded, TraceError> {
+pub(super) fn weld(
+    mesh: &TriMesh,
+    map: &SeamlessMap,
+    arcs: &[Vec<Point>],
+    meeting: Meeting,
+) -> Result<Welded, TraceError> {
     let mut sheet = Sheet::new(mesh);
-    let mut owner = vec![u32::MAX; mesh.n_vertices()];
-    let mut paths = Vec::with_capacity(arcs.len());
     for (arc, points) in (0u32..).zip(arcs) {
-        for point in points.iter().skip(1).take(points.len().saturating_sub(2)) {
-            if let Point::Vertex(v) = *point {
-                if owner[v.index()] != u32::MAX {
-                    let face = mesh.face(mesh.vertex_halfedge(v));
-                    return Err(TraceError::Crossing { arcs: [owner[v.index()], arc], face });
-                }
-                owner[v.index()] = arc;
-            }
-        }
-        paths.push(sheet.lay(mesh, arc, points));
+        sheet.lay(mesh, arc, points, meeting)?;
     }
     for points in &mut sheet.on_edge {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    let mut out = Pieces::default();
+    let mut out = Pieces { positions: std::mem::take(&mut sheet.positions), ..Pieces::default() };
     for f in mesh.faces() {
-        out.cut(&sheet, mesh, map, f)?;
+        out.cut(border(&sheet, &out.positions, mesh, map, f), &sheet.chords[f.index()], f, meeting)?;
     }
-    let refined_mesh = TriMesh::from_faces(sheet.positions, &out.faces)?;
+    let path = |(arc, points): (u32, &Vec<Point>)| sheet.path(&mut out, mesh, (arc, points), meeting);
+    let paths = (0u32..).zip(arcs).map(path).collect::<Result<Vec<_>, _>>()?;
+    let refined_mesh = TriMesh::from_faces(out.positions, &out.faces)?;
     let jump = refined_mesh.edges().map(|e| {
         let h = refined_mesh.halfedge(e);
         let base = HalfedgeId(out.base_halfedge[h.index()]);
@@ -93,13 +100,25 @@ pub(super) fn weld(mesh: &TriMesh, map: &SeamlessMap, arcs: &[Vec<Point>]) -> Re
     Ok(Welded { mesh: refined_mesh, refined, base_face: out.base_face, map, paths })
 }
 
+/// A piece of an arc inside a triangle, or what is left of it between crossings.
+#[derive(Debug, Clone, Copy)]
+struct Chord {
+    ends: [u32; 2],
+    arc: u32,
+    /// The piece of the arc, numbered by its second point.
+    piece: u32,
+}
+
 /// The points on all edges and the chords in all triangles.
 struct Sheet {
     positions: Vec<DVec3>,
-    /// Points on each edge: fraction along [`TriMesh::halfedge`] and vertex; in this order after sorting.
-    on_edge: Vec<Vec<(f64, u32)>>,
-    /// Chords in each triangle: both end vertices and the arc.
-    chords: Vec<Vec<[u32; 3]>>,
+    /// Points on each edge: fraction along [`TriMesh::halfedge`], vertex and arc; in this order after sorting.
+    on_edge: Vec<Vec<(f64, u32, u32)>>,
+    chords: Vec<Vec<Chord>>,
+    /// Arc through each vertex of the mesh or along each edge, or `u32::MAX`.
+    through: Vec<u32>,
+    /// Vertex of each point of each arc.
+    vertices: Vec<Vec<u32>>,
 }
 
 impl Sheet {
@@ -108,19 +127,29 @@ impl Sheet {
             positions: mesh.positions().to_vec(),
             on_edge: vec![Vec::new(); mesh.n_edges()],
             chords: vec![Vec::new(); mesh.n_faces()],
+            through: vec![u32::MAX; mesh.n_vertices()],
+            vertices: Vec::new(),
         }
     }
 
-    /// Notes the points and chords of an arc; returns its vertices.
-    fn lay(&mut self, mesh: &TriMesh, arc: u32, points: &[Point]) -> Vec<u32> {
+    /// Notes the points and chords of an arc.
+    fn lay(&mut self, mesh: &TriMesh, arc: u32, points: &[Point], meeting: Meeting) -> Result<(), TraceError> {
         let mut path: Vec<u32> = Vec::with_capacity(points.len());
         for (i, point) in points.iter().enumerate() {
             let vertex = match *point {
-                Point::Vertex(v) => v.0,
+                Point::Vertex(v) => {
+                    let inside = i > 0 && i + 1 < points.len();
+                    let other = std::mem::replace(&mut self.through[v.index()], if inside { arc } else { u32::MAX });
+                    if inside && other != u32::MAX && meeting == Meeting::Wrong {
+                        let face = mesh.face(mesh.vertex_halfedge(v));
+                        return Err(TraceError::Crossing { arcs: [other, arc], face });
+                    }
+                    v.0
+                }
                 Point::Edge(h, t) => {
                     let (e, new) = (mesh.edge(h), self.positions.len() as u32);
                     self.positions.push(point.position(mesh));
-                    self.on_edge[e.index()].push((if mesh.halfedge(e) == h { t } else { 1.0 - t }, new));
+                    self.on_edge[e.index()].push((if mesh.halfedge(e) == h { t } else { 1.0 - t }, new, arc));
                     new
                 }
             };
@@ -131,11 +160,43 @@ impl Sheet {
                 _ => None,
             };
             if let (Some(f), Some(&before)) = (face, path.last()) {
-                self.chords[f.index()].push([before, vertex, arc]);
+                self.chords[f.index()].push(Chord { ends: [before, vertex], arc, piece: i as u32 });
             }
             path.push(vertex);
         }
-        path
+        self.vertices.push(path);
+        Ok(())
+    }
+
+    /// The vertices of an arc with those where it meets others.
+    fn path(
+        &self,
+        pieces: &mut Pieces,
+        mesh: &TriMesh,
+        (arc, points): (u32, &[Point]),
+        meeting: Meeting,
+    ) -> Result<Vec<u32>, TraceError> {
+        let vertices = &self.vertices[arc as usize];
+        let mut path = vec![vertices[0]];
+        for i in 1..vertices.len() {
+            let start = pieces.positions[vertices[i - 1] as usize];
+            let mut met = pieces.met.remove(&(arc, i as u32)).unwrap_or_default();
+            if let (Point::Vertex(a), Point::Vertex(b)) = (points[i - 1], points[i]) {
+                let around = |v: VertexId, w: VertexId| mesh.outgoing(v).find(|&h| mesh.target(h) == w);
+                if let Some(h) = around(a, b).or_else(|| around(b, a)) {
+                    let across = &self.on_edge[mesh.edge(h).index()];
+                    if let Some(p) = across.first().filter(|_| meeting == Meeting::Wrong) {
+                        return Err(TraceError::Crossing { arcs: [p.2, arc], face: mesh.face(h) });
+                    }
+                    met.extend(across.iter().map(|p| p.1));
+                }
+            }
+            let away = |v: &u32| pieces.positions[*v as usize].distance_squared(start);
+            met.sort_by(|a, b| away(a).total_cmp(&away(b)));
+            path.extend(met);
+            path.push(vertices[i]);
+        }
+        Ok(path)
     }
 }
 
@@ -145,6 +206,7 @@ struct Corner {
     vertex: u32,
     /// Place in an equilateral triangle, which says how good pieces are whatever the triangle's own shape.
     place: DVec2,
+    position: DVec3,
     uv: DVec2,
     /// The sides it lies on, as bits.
     sides: u8,
@@ -153,40 +215,77 @@ struct Corner {
 /// The corners of an equilateral triangle.
 const EQUILATERAL: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::new(0.5, 0.866_025_403_784_438_6)];
 
+impl Corner {
+    fn between(a: &Self, b: &Self, t: f64, vertex: u32, sides: u8) -> Self {
+        Self {
+            vertex,
+            place: a.place.lerp(b.place, t),
+            position: a.position.lerp(b.position, t),
+            uv: a.uv.lerp(b.uv, t),
+            sides,
+        }
+    }
+}
+
 /// The triangles made so far.
 #[derive(Default)]
 struct Pieces {
+    positions: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
     uv: Vec<[DVec2; 3]>,
     base_face: Vec<u32>,
     /// Half-edge of the base mesh that each half-edge lies on, or `u32::MAX`.
     base_halfedge: Vec<u32>,
+    /// Vertices where a piece of an arc meets others inside its triangle.
+    met: BTreeMap<(u32, u32), Vec<u32>>,
 }
 
 impl Pieces {
-    /// Cuts a triangle along its chords.
-    fn cut(&mut self, sheet: &Sheet, mesh: &TriMesh, map: &SeamlessMap, f: FaceId) -> Result<(), TraceError> {
-        let mut todo = vec![(border(sheet, mesh, map, f), sheet.chords[f.index()].clone())];
+    /// Cuts a triangle with a given border along its chords.
+    fn cut(&mut self, border: Vec<Corner>, chords: &[Chord], f: FaceId, meeting: Meeting) -> Result<(), TraceError> {
+        let mut todo = vec![(border, chords.to_vec())];
         while let Some((polygon, mut chords)) = todo.pop() {
-            let Some([a, b, arc]) = chords.pop() else {
+            let Some(chord) = chords.pop() else {
                 self.triangulate(f, &polygon);
                 continue;
             };
+            let crossed = |other: u32| TraceError::Crossing { arcs: [chord.arc, other], face: f };
             let place = |v: u32| polygon.iter().position(|c| c.vertex == v);
-            let crossed = |other: u32| TraceError::Crossing { arcs: [arc, other], face: f };
-            let (Some(a), Some(b)) = (place(a), place(b)) else { return Err(crossed(arc)) };
-            let (a, b) = (a.min(b), a.max(b));
-            let one = polygon[a..=b].to_vec();
-            let two: Vec<Corner> = polygon[b..].iter().chain(&polygon[..=a]).copied().collect();
+            let (Some(a), Some(b)) = (place(chord.ends[0]), place(chord.ends[1])) else {
+                return Err(crossed(chord.arc));
+            };
+            let (low, high) = (a.min(b), a.max(b));
+            let mut one = polygon[low..=high].to_vec();
+            let mut two: Vec<Corner> = polygon[high..].iter().chain(&polygon[..=low]).copied().collect();
+            let inside = |p: &[Corner], c: &Chord| c.ends.iter().all(|&v| p.iter().any(|x| x.vertex == v));
+            let (mut first, rest): (Vec<_>, Vec<_>) = chords.into_iter().partition(|c| inside(&one, c));
+            let (mut second, across): (Vec<_>, Vec<_>) = rest.into_iter().partition(|c| inside(&two, c));
+            if let Some(c) = across.first().filter(|_| meeting == Meeting::Wrong) {
+                return Err(crossed(c.arc));
+            }
+            let mut shared = Vec::with_capacity(across.len());
+            for c in across {
+                let [Some(p), Some(q)] = c.ends.map(place) else { return Err(crossed(c.arc)) };
+                let t = meet([polygon[low], polygon[high]], [polygon[p], polygon[q]]);
+                let vertex = self.positions.len() as u32;
+                let corner = Corner::between(&polygon[low], &polygon[high], t, vertex, 0);
+                self.positions.push(corner.position);
+                shared.push((t, corner));
+                for piece in [chord, c] {
+                    self.met.entry((piece.arc, piece.piece)).or_default().push(vertex);
+                }
+                let halves = [Chord { ends: [c.ends[0], vertex], ..c }, Chord { ends: [vertex, c.ends[1]], ..c }];
+                let starts_in_one = low < p && p < high;
+                first.push(halves[usize::from(!starts_in_one)]);
+                second.push(halves[usize::from(starts_in_one)]);
+            }
+            shared.sort_by(|a, b| a.0.total_cmp(&b.0));
+            one.extend(shared.iter().rev().map(|s| s.1));
+            two.extend(shared.iter().map(|s| s.1));
             if one.len() < 3 || two.len() < 3 {
-                return Err(crossed(arc));
+                return Err(crossed(chord.arc));
             }
-            let inside = |p: &[Corner], c: &[u32; 3]| c[..2].iter().all(|&v| p.iter().any(|x| x.vertex == v));
-            let (first, rest): (Vec<_>, Vec<_>) = chords.into_iter().partition(|c| inside(&one, c));
-            if let Some(c) = rest.iter().find(|c| !inside(&two, c)) {
-                return Err(crossed(c[2]));
-            }
-            todo.push((two, rest));
+            todo.push((two, second));
             todo.push((one, first));
         }
         Ok(())
@@ -226,20 +325,21 @@ impl Pieces {
 }
 
 /// The corners of a triangle and the points on its sides, counter-clockwise.
-fn border(sheet: &Sheet, mesh: &TriMesh, map: &SeamlessMap, f: FaceId) -> Vec<Corner> {
+fn border(sheet: &Sheet, positions: &[DVec3], mesh: &TriMesh, map: &SeamlessMap, f: FaceId) -> Vec<Corner> {
     let mut corners = Vec::new();
+    let ends = [0, 1, 2].map(|i| {
+        let vertex = mesh.face_vertices(f)[i];
+        let (position, uv) = (positions[vertex.index()], map.uv[f.index()][i]);
+        Corner { vertex: vertex.0, place: EQUILATERAL[i], position, uv, sides: 1 << i | 1 << ((i + 2) % 3) }
+    });
     for (i, h) in mesh.face_halfedges(f).into_iter().enumerate() {
-        let next = (i + 1) % 3;
-        let (from, to) = (map.uv[f.index()][i], map.uv[f.index()][next]);
-        let sides = 1 << i | 1 << ((i + 2) % 3);
-        corners.push(Corner { vertex: mesh.origin(h).0, place: EQUILATERAL[i], uv: from, sides });
+        corners.push(ends[i]);
         let e = mesh.edge(h);
         let points = &sheet.on_edge[e.index()];
         let forward = mesh.halfedge(e) == h;
         corners.extend((0..points.len()).map(|k| {
-            let (s, vertex) = if forward { points[k] } else { points[points.len() - 1 - k] };
-            let t = if forward { s } else { 1.0 - s };
-            Corner { vertex, place: EQUILATERAL[i].lerp(EQUILATERAL[next], t), uv: from.lerp(to, t), sides: 1 << i }
+            let (s, vertex, _) = if forward { points[k] } else { points[points.len() - 1 - k] };
+            Corner::between(&ends[i], &ends[(i + 1) % 3], if forward { s } else { 1.0 - s }, vertex, 1 << i)
         }));
     }
     corners
@@ -254,4 +354,13 @@ fn quality(polygon: &[Corner], corners: [usize; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(|x| x.place);
     let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
     (b - a).perp_dot(c - a) / longest
+}
+
+/// Where the chord `c` meets the chord `d`, as a fraction of `c` off its ends.
+fn meet(c: [Corner; 2], d: [Corner; 2]) -> f64 {
+    // Distance from its ends below which a crossing is put off them: what is nearer is not told apart.
+    const APART: f64 = 1e-6;
+    let ([a, b], [p, q]) = (c.map(|x| x.place), d.map(|x| x.place));
+    let t = (p - a).perp_dot(q - p) / (b - a).perp_dot(q - p);
+    if t.is_finite() { t.clamp(APART, 1.0 - APART) } else { 0.5 }
 }

@@ -8,24 +8,38 @@
 
 mod bending;
 mod descent;
+mod emerge;
 mod gradient;
 mod guides;
 mod lift;
+mod march;
 mod measures;
 mod net;
+mod patches;
 mod relocate;
+mod rose;
 mod shift;
 mod sizing;
+mod trace;
 mod voronoi;
+mod weld;
 mod working;
+
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod tests;
 
 pub use bending::face_curvature;
 pub use descent::{Optimizer, Settings, State, Surface};
+pub use emerge::{EmergeError, Emerged, emerge};
 pub use guides::{Guide, feature_guides, shape_guides};
 pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use net::{Headings, Net, NetArc, NetNode, headings};
+pub use patches::{RectangleError, map_rectangles};
 pub use relocate::Hold;
 pub use sizing::{SizingSystem, rest_turns};
+pub use trace::{ArcChain, TraceError, Traced, preview_arcs, trace_arcs};
 
 use thiserror::Error;
 

@@ -9,6 +9,9 @@ mod patch;
 mod piece;
 mod structure;
 
+pub(crate) use disc::flipped;
 pub use embed::{EmbedError, Embedding, embed};
+pub(crate) use patch::{Lookup, border_sides, flood};
 pub use patch::{PatchError, PatchMap, map_patches};
+pub(crate) use piece::Piece;
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};

@@ -278,7 +278,8 @@ fn wanted(mesh: &TriMesh, metric: &Metric, jump: &[i32], h: HalfedgeId) -> f64 {
 
 /// The index of each vertex in quarters, exactly as the jumps have it: a node there has valence `4 − index`, at the
 /// boundary `3 − index` if the field is aligned with it. Around an inner vertex the angles cancel; at the boundary
-/// they count.
+/// they count. Raising the jump of an edge by one lowers the index at the target of its [`TriMesh::halfedge`] by one
+/// and raises that at the origin.
 pub fn indices(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<i32> {
     let mut turn: Vec<f64> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { PI } else { TAU }).collect();
     for h in mesh.halfedges() {

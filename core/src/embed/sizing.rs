@@ -28,7 +28,8 @@ const MOST: f64 = 2.5;
 const ROUNDS: usize = 3;
 
 /// For each edge what the cross turns from the triangle of [`TriMesh::halfedge`] to that of its twin beyond the
-/// period jump; 0 on the boundary. `jump` has whole numbers, not reduced modulo four: what is left is not reduced either.
+/// period jump; 0 on the boundary. `jump` has whole numbers, not reduced modulo four, and what is left is not
+/// reduced either.
 pub fn rest_turns(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<f64> {
     let rest = |e: EdgeId| {
         let h = mesh.halfedge(e);

@@ -38,8 +38,8 @@ const STRENGTH: f64 = 1.2;
 /// 0.03 that curvature is averaged over, larger values stem from slivers and creases.
 const MOST: f64 = 40.0;
 /// `(κ₁ − κ₂) / (|κ₁| + |κ₂|)`, 0 on a sphere and 1 on cylinders and saddles, where guides begin and where they are
-/// full. On a sphere of 4000 points that are off by up to a thousandth of the
-/// diagonal nine tenths of the triangles show less than 0.18.
+/// full. On a sphere of 4000 points that are off by up to a thousandth of the diagonal nine tenths of the triangles
+/// show less than 0.18.
 const ANISOTROPIC: [f64; 2] = [0.2, 0.6];
 /// Guides weaker than this prevail nowhere in less than the whole surface.
 const LEAST: f64 = 1.0;

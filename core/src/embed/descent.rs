@@ -253,8 +253,8 @@ impl Solver<'_> {
         let lengths = if self.settings.sizing {
             let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
             self.sizes = Some(system.symbolic());
-            let rest = rest_turns(mesh, &metric, &angle, |e| net.jump[e.index()]);
-            system.sizes(mesh, &metric, &rest)?.into_iter().map(|s| [s; 2]).collect()
+            let rest = rest_turns(mesh, &metric, &angle, &net.jump);
+            system.lengths(mesh, &metric, &rest)?
         } else {
             Vec::new()
         };
@@ -275,15 +275,8 @@ impl Solver<'_> {
 
     fn guides(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
         let mesh = &net.mesh;
-        let open = |g: super::guides::Guide| field::Guide {
-            face: g.face,
-            angle: g.angle,
-            weight: g.weight * field::RELIABLE,
-            branch: None,
-        };
-        let mut guides: Vec<field::Guide> =
-            shape_guides(mesh, metric, self.curvature, self.sharp).into_iter().map(open).collect();
-        guides.extend(feature_guides(mesh, metric, self.sharp).into_iter().map(open));
+        let mut guides = shape_guides(mesh, metric, self.curvature, self.sharp);
+        guides.extend(feature_guides(mesh, metric, self.sharp));
         for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
             if let Some(&(k, _)) = net.boundary.get(&h) {
                 let (face, angle) = (mesh.face(h), metric.direction(h));

@@ -10,20 +10,9 @@
 //! gentle bend over a wide area.
 
 use super::bending::face_curvature;
-use crate::field::Metric;
+use crate::field::{Guide, Metric, RELIABLE};
 use crate::mesh::{FaceId, TriMesh};
 use crate::surface::PrincipalCurvature;
-
-/// A direction that the cross of a triangle should have as one of its four.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guide {
-    /// The triangle.
-    pub face: FaceId,
-    /// The direction in the triangle's frame of the [`Metric`]; means the same modulo quarter turns.
-    pub angle: f64,
-    /// How strongly, where the smoothness across an edge between equilateral triangles weighs 1.
-    pub weight: f64,
-}
 
 /// The distance over which a principal direction prevails is the inverse of this times `κ₁ − κ₂`.
 ///
@@ -45,8 +34,6 @@ const ANISOTROPIC: [f64; 2] = [0.2, 0.6];
 const LEAST: f64 = 1.0;
 /// The smoothness weight of an edge between equilateral triangles, its length over the distance of their centres.
 const EQUILATERAL: f64 = 1.732_050_807_568_877_2;
-/// The weight of features: exact, but for some slack where they bend or meet (thesis, section 6.3.2).
-const FEATURE: f64 = 100.0;
 
 /// The reliable principal directions, by triangle. `curvature` has an entry per vertex, `sharp` a flag per edge
 /// (empty: none). Corners on sharp edges tell nothing of the smooth surface beside them and are left out.
@@ -61,7 +48,7 @@ pub fn shape_guides(mesh: &TriMesh, metric: &Metric, curvature: &[PrincipalCurva
     let guide = |face: FaceId| {
         let pull = pull(&bending[face.index()])?;
         let angle = metric.angle_of(mesh, face, bending[face.index()].d_max)?;
-        Some(Guide { face, angle, weight: pull * metric.area(face) / EQUILATERAL })
+        Some(Guide { face, angle, weight: pull * metric.area(face) / EQUILATERAL, branch: None })
     };
     mesh.faces().filter_map(guide).collect()
 }
@@ -84,7 +71,7 @@ fn ramp(x: f64, [from, to]: [f64; 2]) -> f64 {
 /// each triangle at each edge, all of full weight.
 pub fn feature_guides(mesh: &TriMesh, metric: &Metric, along: &[bool]) -> Vec<Guide> {
     let marked = mesh.halfedges().filter(|&h| along[mesh.edge(h).index()]);
-    marked.map(|h| Guide { face: mesh.face(h), angle: metric.direction(h), weight: FEATURE }).collect()
+    marked.map(|h| Guide { face: mesh.face(h), angle: metric.direction(h), weight: RELIABLE, branch: None }).collect()
 }
 
 #[cfg(test)]
@@ -144,7 +131,7 @@ mod tests {
         assert_eq!(found.len(), 12);
         for g in &found {
             let tangent = metric.tangent(&mesh, g.face, g.angle);
-            assert!(tangent.x.abs().max(tangent.y.abs()) > 1.0 - 1e-12 && g.weight == FEATURE);
+            assert!(tangent.x.abs().max(tangent.y.abs()) > 1.0 - 1e-12 && g.weight == RELIABLE);
         }
         let inner: Vec<bool> = along.iter().map(|a| !a).collect();
         assert_eq!(feature_guides(&mesh, &metric, &inner).len(), 2 * inner.iter().filter(|&&i| i).count());

@@ -33,7 +33,7 @@ mod tests;
 pub use bending::face_curvature;
 pub use descent::{Optimizer, Settings, State, Surface};
 pub use emerge::{EmergeError, Emerged, emerge};
-pub use guides::{Guide, feature_guides, shape_guides};
+pub use guides::{feature_guides, shape_guides};
 pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use net::{Headings, Net, NetArc, NetNode, headings};
 pub use patches::{RectangleError, map_rectangles};

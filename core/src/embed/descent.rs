@@ -4,6 +4,8 @@
 //! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
 //! another follows; if not, it is taken back and tried at half the length.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::{DVec2, DVec3};
 
 use super::gradient::descent;
@@ -11,6 +13,7 @@ use super::guides::{feature_guides, shape_guides};
 use super::net::{Headings, Net};
 use super::relocate::{Ground, Hold};
 use super::sizing::{SizingSystem, rest_turns};
+use super::straight::{Crossroads, corner};
 use super::{EmbeddingError, voronoi};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::layout::{Embedding, QuadLayout};
@@ -18,11 +21,21 @@ use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::{Objective, Relation, SeamlessSystem, Solution};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
-use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex, SurfacePoint};
+use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
 
 /// Length of a step over the length of the gradient: the estimator is half as long again as the gradient itself, and
 /// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
 const STEP: f64 = 0.75 * 2.0 / 3.0;
+
+/// Deviation, in quarter turns, up to which a principal direction fully guides the field, and from which on not at all:
+/// beyond an eighth of a turn it would be another direction's.
+const AGREES: f64 = 0.15;
+const DISAGREES: f64 = 0.35;
+/// Pull of the rough drawing, in inverse squared lengths on a surface of bounding-box diagonal 1: it tells how the
+/// field as a whole is turned where nothing else does, and prevails in less than the whole surface nowhere.
+const DRAWN: f64 = 0.5;
+/// Rounds of guiding the first field, in each of which more directions come to agree.
+const FIRST_ROUNDS: usize = 4;
 
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
@@ -79,6 +92,7 @@ pub struct Optimizer<'a> {
     settings: Settings,
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
+    roads: Crossroads,
     guided: GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
@@ -108,6 +122,7 @@ impl<'a> Optimizer<'a> {
         let net = Net::new(surface.mesh, embedding, layout, headings)?;
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);
+        let roads = Crossroads::new(layout, |i| pinned.get(i).copied().unwrap_or(false));
         let ground = ground(&surface, &net, &sharp, pinned);
         let nearest = |v: usize| {
             if v < surface.mesh.n_vertices() {
@@ -119,8 +134,15 @@ impl<'a> Optimizer<'a> {
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
         let guided = GuidedSystem::new(&net.mesh)?;
         let metric = Metric::new(&net.mesh);
-        let mut solver =
-            Solver { curvature: &curvature, sharp: &sharp, guided: &guided, seamless: None, sizes: None, settings };
+        let mut solver = Solver {
+            curvature: &curvature,
+            sharp: &sharp,
+            roads: &roads,
+            guided: &guided,
+            seamless: None,
+            sizes: None,
+            settings,
+        };
         let state = solver.solve(net, metric, None, progress)?;
         let (seamless, sizes) = (solver.seamless, solver.sizes);
         Ok(Self {
@@ -129,6 +151,7 @@ impl<'a> Optimizer<'a> {
             settings,
             curvature,
             sharp,
+            roads,
             guided,
             seamless,
             sizes,
@@ -162,6 +185,7 @@ impl<'a> Optimizer<'a> {
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
+            roads: &self.roads,
             guided: &self.guided,
             seamless: self.seamless.take(),
             sizes: self.sizes.take(),
@@ -230,6 +254,7 @@ impl<'a> Optimizer<'a> {
 struct Solver<'s> {
     curvature: &'s [PrincipalCurvature],
     sharp: &'s [bool],
+    roads: &'s Crossroads,
     guided: &'s GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
@@ -245,10 +270,7 @@ impl Solver<'_> {
         progress: &Progress,
     ) -> Result<State, EmbeddingError> {
         let mesh = &net.mesh;
-        let guides = self.guides(&net, &metric);
-        let angle =
-            self.guided.solve(mesh, &metric, &net.jump, &guides, previous.or(Some(&net.angle)), progress)?.angle;
-        progress.check()?;
+        let angle = self.angles(&net, &metric, previous, progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
         let lengths = if self.settings.sizing {
             let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
@@ -259,7 +281,7 @@ impl Solver<'_> {
             Vec::new()
         };
         let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
-        let relations = relations(&net, &metric, &angle, self.sharp);
+        let relations = relations(&net, self.roads, &metric, &angle, self.sharp);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let system = match self.seamless.take() {
             Some(mut system) => {
@@ -273,10 +295,40 @@ impl Solver<'_> {
         Ok(State { net, metric, field, objective, solution })
     }
 
-    fn guides(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
+    /// The angles of the guiding field; at first, without those of a field before, in several rounds.
+    fn angles(
+        &self,
+        net: &Net,
+        metric: &Metric,
+        previous: Option<&[f64]>,
+        progress: &Progress,
+    ) -> Result<Vec<f64>, EmbeddingError> {
         let mesh = &net.mesh;
-        let mut guides = shape_guides(mesh, metric, self.curvature, self.sharp);
-        guides.extend(feature_guides(mesh, metric, self.sharp));
+        let held = self.held_directions(net, metric);
+        let shape = shape_guides(mesh, metric, self.curvature, self.sharp);
+        let (mut angle, rounds) = match previous {
+            Some(angle) => (angle.to_vec(), 1),
+            None => (net.angle.clone(), FIRST_ROUNDS),
+        };
+        for _ in 0..rounds {
+            let mut guides = held.clone();
+            guides.extend(shape.iter().filter_map(|g| agreeing(g, angle[g.face.index()])));
+            angle = self.guided.solve(mesh, metric, &net.jump, &guides, Some(&angle), progress)?.angle;
+        }
+        Ok(angle)
+    }
+
+    /// Directions that hold whatever the field: those of features, of which it is open which direction of a cross
+    /// follows them, those of the boundary, of which the layout tells, and weakly those of the drawing.
+    fn held_directions(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
+        let mesh = &net.mesh;
+        let mut guides = feature_guides(mesh, metric, self.sharp);
+        guides.extend(mesh.faces().map(|face| field::Guide {
+            face,
+            angle: net.angle[face.index()],
+            weight: DRAWN * metric.area(face),
+            branch: Some(0),
+        }));
         for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
             if let Some(&(k, _)) = net.boundary.get(&h) {
                 let (face, angle) = (mesh.face(h), metric.direction(h));
@@ -287,19 +339,30 @@ impl Solver<'_> {
     }
 }
 
+/// A guide as strong as it agrees with the field at hand; `None` where it does not.
+///
+/// The layout's structure prevails over principal directions: where both contradict each other, or a direction is
+/// wrongly taken for its neighbour a quarter turn away, the field would turn by a quarter within a few triangles and
+/// tear the map.
+fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
+    let off = (guide.angle - angle) / FRAC_PI_2;
+    let off = (off - off.round()).abs();
+    let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
+    (share > 0.0).then(|| field::Guide { weight: guide.weight * share, ..*guide })
+}
+
 /// That every arc is an isoline, and every edge of the boundary and of a feature.
-fn relations(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<Relation> {
+fn relations(net: &Net, roads: &Crossroads, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<Relation> {
     let mesh = &net.mesh;
     let along = |k: i32| if k % 2 == 0 { 1 } else { 0 };
-    let mut relations: Vec<Relation> = net
-        .arcs
-        .iter()
-        .filter(|a| !a.boundary)
-        .map(|a| Relation {
-            from: corner(a.start),
-            crossed: a.crossed.clone(),
-            to: corner(a.end),
-            axis: along(i32::from(a.heading)),
+    let mut relations: Vec<Relation> = roads
+        .chains(net)
+        .into_iter()
+        .map(|c| Relation {
+            from: corner(c.start),
+            to: corner(c.end),
+            crossed: c.crossed,
+            axis: along(i32::from(c.heading)),
             difference: 0.0,
         })
         .collect();
@@ -315,18 +378,11 @@ fn relations(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<R
         if let Some(&(k, _)) = net.boundary.get(&h) {
             relations.push(on_edge(h, i32::from(k)));
         } else if sharp[e.index()] && !mesh.is_boundary_edge(e) {
-            let turns = (metric.direction(h) - angle[mesh.face(h).index()]) / std::f64::consts::FRAC_PI_2;
+            let turns = (metric.direction(h) - angle[mesh.face(h).index()]) / FRAC_PI_2;
             relations.push(on_edge(h, (turns.round() as i32).rem_euclid(4)));
         }
     }
     relations
-}
-
-/// The corner at the origin of a half-edge as a point of the surface.
-fn corner(h: HalfedgeId) -> SurfacePoint {
-    let mut weights = [0.0; 3];
-    weights[h.index() % 3] = 1.0;
-    SurfacePoint { face: crate::mesh::FaceId::new(h.index() / 3), weights }
 }
 
 /// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.
@@ -397,4 +453,37 @@ fn turns(mesh: &TriMesh, curve: &[bool], v: VertexId) -> bool {
         .map(|w| (mesh.position(w) - mesh.position(v)).normalize_or_zero())
         .collect();
     ends.iter().any(|a| ends.iter().all(|b| a == b || -a.dot(*b) < CORNER))
+}
+
+impl Optimizer<'_> {
+    #[allow(missing_docs)]
+    pub fn probe(&mut self, node: usize, eps: f64) -> Option<(f64, f64, [f64; 4], f64)> {
+        let State { net, metric, field, objective, solution } = self.state.clone();
+        let v = net.nodes[node].vertex;
+        if !self.roads.held[node] || self.ground.hold[node] != Hold::Free {
+            return None;
+        }
+        let d = descent(&net.mesh, &metric, &field.angle, &solution.map.uv, &objective, v);
+        let mut e = [0.0; 4];
+        let mut moved = 0.0;
+        for k in 0..4 {
+            let mut m = net.clone();
+            let cell = voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>());
+            let step = DVec2::from_angle(d.to_angle() + std::f64::consts::FRAC_PI_2 * k as f64) * eps;
+            moved = self.ground.glide(&mut m, &metric, node, step, &cell);
+            let metric = Metric::new(&m.mesh);
+            let mut solver = Solver {
+                curvature: &self.curvature,
+                sharp: &self.sharp,
+                roads: &self.roads,
+                guided: &self.guided,
+                seamless: None,
+                sizes: None,
+                settings: self.settings,
+            };
+            e[k] = solver.solve(m, metric, Some(&field.angle), &Progress::new()).unwrap().solution.energy
+                - solution.energy;
+        }
+        Some((d.length(), moved, e, metric.length(net.mesh.vertex_halfedge(v))))
+    }
 }

@@ -20,6 +20,7 @@ mod relocate;
 mod rose;
 mod shift;
 mod sizing;
+mod straight;
 mod trace;
 mod voronoi;
 mod weld;

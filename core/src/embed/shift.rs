@@ -5,6 +5,8 @@
 //! end and first turn counter-clockwise around the old one, to where they started before; clockwise would
 //! be the same, the old vertex being regular now.
 //!
+//! Other arcs that cross the edge are pushed ahead by the node: they are led around the far side of its new vertex.
+//!
 //! A node on the boundary moves along it. There no jump changes, but the edge now belongs to the arc behind the node.
 
 use super::lift;
@@ -49,6 +51,7 @@ impl Net {
         if self.nodes[node].boundary {
             self.move_border(from, h, forward);
         } else {
+            self.make_way(h);
             lift::shift(&self.mesh, &mut self.jump, h, self.nodes[node].index());
         }
         let Self { mesh, jump, arcs, .. } = self;
@@ -65,6 +68,27 @@ impl Net {
             cancel(mesh, &mut arc.crossed);
         }
         self.nodes[node].vertex = to;
+    }
+
+    /// Leads arcs that cross the edge around its target, which is regular: the node would push them there.
+    fn make_way(&mut self, h: HalfedgeId) {
+        let Self { mesh, arcs, .. } = self;
+        let Some(twin) = mesh.twin(h) else { return };
+        let fan = Fan { corner: h, first: mesh.next(h), counter_clockwise: false };
+        let around = fan.crossed(mesh, twin);
+        let back: Vec<HalfedgeId> = around.iter().rev().filter_map(|&g| mesh.twin(g)).collect();
+        for arc in arcs {
+            if !arc.crossed.iter().any(|&g| g == h || g == twin) {
+                continue;
+            }
+            let lead = |&g: &HalfedgeId| match g {
+                g if g == h => around.clone(),
+                g if g == twin => back.clone(),
+                g => vec![g],
+            };
+            arc.crossed = arc.crossed.iter().flat_map(lead).collect();
+            cancel(mesh, &mut arc.crossed);
+        }
     }
 
     /// Gives the boundary edge a node moves along to the arc behind it.

@@ -135,7 +135,7 @@ impl Neighbours {
 }
 
 /// The free variables that occur in a triangle, each once.
-fn variables(problem: &OrientationProblem, t: u32) -> Vec<u32> {
+pub(super) fn variables(problem: &OrientationProblem, t: u32) -> Vec<u32> {
     let corners = problem.triangles[t as usize].corners.iter().flatten();
     let mut out: Vec<u32> =
         corners.flat_map(|&(x, _)| problem.reduction.expression(x as usize).0.iter().map(|term| term.0)).collect();

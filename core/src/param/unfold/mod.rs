@@ -145,6 +145,9 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
     if y.iter().all(|y| y.is_finite()) {
         let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
         let mut best = attempt.relieve(y)?;
+        if best.folds > 0 && attempt.is_bound(&best.y) {
+            best = attempt.relieve_whole(&best.y, &folded)?;
+        }
         if best.folds > 0
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
         {
@@ -200,10 +203,9 @@ struct Attempt<'a> {
 }
 
 impl Attempt<'_> {
-    /// Unfolds domain by domain, larger and larger ones, at last the whole.
+    /// Unfolds domain by domain, larger and larger ones.
     fn relieve(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
         let mut y = y.to_vec();
-        let first = self.folds(&y);
         let mut before: Vec<Domain> = Vec::new();
         for (i, rings) in RINGS.into_iter().enumerate() {
             let folds = self.folds(&y);
@@ -226,19 +228,39 @@ impl Attempt<'_> {
             }
             before = domains;
         }
-        if !self.folds(&y).is_empty() {
-            self.progress.report("Removing folds", 0.7);
-            let distance = self.neighbours.distance(self.problem, &first, CONFINED_RINGS);
-            let near = |t: u32| distance[t as usize] != u32::MAX;
-            let x = self.problem.reduction.expand(&y);
-            let whole = self.neighbours.whole(self.problem);
-            if let Some(values) = local::straighten(self.problem, &whole, &y, &x, self.spared, near, self.progress)? {
-                for (&i, value) in whole.inner.iter().zip(values) {
-                    y[i as usize] = value;
-                }
+        Ok(self.candidate(y))
+    }
+
+    /// Unfolds the whole at once: translations and related coordinates move too.
+    fn relieve_whole(&self, y: &[f64], confined: &[u32]) -> Result<Candidate, Cancelled> {
+        self.progress.report("Removing folds", 0.6);
+        let distance = self.neighbours.distance(self.problem, confined, CONFINED_RINGS);
+        let near = |t: u32| distance[t as usize] != u32::MAX;
+        let x = self.problem.reduction.expand(y);
+        let whole = self.neighbours.whole(self.problem);
+        let mut y = y.to_vec();
+        if let Some(values) = local::straighten(self.problem, &whole, &y, &x, self.spared, near, self.progress)? {
+            for (&i, value) in whole.inner.iter().zip(values) {
+                y[i as usize] = value;
             }
         }
-        Ok(Candidate { folds: self.folds(&y).len(), energy: self.problem.energy(&y), y })
+        Ok(self.candidate(y))
+    }
+
+    /// Whether variables that no domain holds occur near the folds of `y`.
+    fn is_bound(&self, y: &[f64]) -> bool {
+        let folds = self.folds(y);
+        let widest = RINGS[RINGS.len() - 1];
+        let distance = self.neighbours.distance(self.problem, &folds, RINGS[0]);
+        let domains = self.neighbours.domains(self.problem, &folds, widest);
+        domains.iter().any(|d| {
+            let near = d.triangles.iter().filter(|t| distance[**t as usize] != u32::MAX);
+            near.flat_map(|&t| domain::variables(self.problem, t)).any(|y| d.inner.binary_search(&y).is_err())
+        })
+    }
+
+    fn candidate(&self, y: Vec<f64>) -> Candidate {
+        Candidate { folds: self.folds(&y).len(), energy: self.problem.energy(&y), y }
     }
 
     /// Folds that there is hope for.

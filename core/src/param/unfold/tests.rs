@@ -118,28 +118,136 @@ fn swapped_vertices_are_reported_or_resolved() {
     assert!(out.folds.len() <= out.folds_before);
 }
 
-#[test]
-fn measure() {
-    for (drag, label) in [(2.0, "2"), (3.0, "3"), (4.0, "4")] {
-        let n = 100;
-        let mut pins = boundary(n);
-        for j in 0..5 {
-            for i in 0..6 {
-                let v = at(n, 10 + 16 * i, 12 + 19 * j);
-                let angle = f64::from(7 * i + 5 * j * j);
-                pins.push((v, point(n, v) + drag * DVec2::from_angle(angle)));
+/// A disc of `rings` rings of triangles around vertex 0, `sectors` in the first, whose angle in the map is
+/// `quarters` quarter turns. Charts are those of the sectors, each turned a quarter against the one before; what the
+/// quarters lack to the sectors is cut at the first ray.
+fn fan(sectors: u32, quarters: u32, rings: u32, pins: &[(u32, u32, u32, DVec2)]) -> Sheet {
+    let angle = std::f64::consts::TAU / f64::from(sectors);
+    // Vertex (ring, sector, step) lies on the side of the ring from one ray to the next.
+    let vertex = |r: u32, s: u32, k: u32| {
+        if r == 0 { 0 } else { 1 + sectors * r * (r - 1) / 2 + (s * r + k) % (sectors * r) }
+    };
+    let n_vertices = 1 + sectors * rings * (rings + 1) / 2;
+    let place = |r: u32, k: u32| f64::from(r - k) * DVec2::X + f64::from(k) * DVec2::from_angle(angle);
+    let (mut triangles, mut constraints) = (Vec::new(), Vec::new());
+    // Each sector has wedges of its own: coordinates are cut along all rays.
+    let per_sector = (rings + 1) * (rings + 2) / 2;
+    let wedge = |r: u32, s: u32, k: u32| s * per_sector + r * (r + 1) / 2 + k;
+    for s in 0..sectors {
+        // The field turns with the sector: evenly spread over the angle of the map.
+        let turn = std::f64::consts::FRAC_PI_2 * f64::from(quarters) / f64::from(sectors) * f64::from(s);
+        let chart = (turn / std::f64::consts::FRAC_PI_2).round();
+        let axis = DVec2::from_angle(std::f64::consts::FRAC_PI_2 * chart - turn);
+        for r in 0..rings {
+            for k in 0..=r {
+                let mut add = |corners: [(u32, u32); 3]| {
+                    triangles.push(OrientedTriangle {
+                        axis,
+                        ..triangle(
+                            corners.map(|(r, k)| place(r, k)),
+                            corners.map(|(r, k)| vertex(r, s, k)),
+                            corners.map(|(r, k)| wedge(r, s, k)),
+                        )
+                    });
+                };
+                add([(r, k), (r + 1, k), (r + 1, k + 1)]);
+                if k < r {
+                    add([(r, k), (r + 1, k + 1), (r, k + 1)]);
+                }
             }
         }
-        let sheet = pinned(n, &pins);
-        let t0 = std::time::Instant::now();
+        // Along the ray after this sector: w_next = i^-p w.
+        let next = (s + 1) % sectors;
+        let turn = std::f64::consts::FRAC_PI_2 * f64::from(quarters) / f64::from(sectors) * f64::from(s + 1);
+        let chart_next = (turn / std::f64::consts::FRAC_PI_2).round();
+        let p = (chart_next - chart) as i32;
+        for r in 0..=rings {
+            let (a, b) = (2 * wedge(r, s, r), 2 * wedge(r, next, 0));
+            let rows = [(0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0)];
+            let (iu, su) = rows[p.rem_euclid(4) as usize];
+            let (iv, sv) = rows[(p + 1).rem_euclid(4) as usize];
+            constraints.push(Constraint { terms: vec![(b, 1.0), (a + iu, -su)], rhs: 0.0 });
+            constraints.push(Constraint { terms: vec![(b + 1, 1.0), (a + iv, -sv)], rhs: 0.0 });
+        }
+    }
+    let variables = vec![1; (2 * sectors * per_sector) as usize];
+    constraints.extend(fix(0, DVec2::ZERO));
+    constraints.extend(pins.iter().flat_map(|&(r, s, k, to)| fix(wedge(r, s, k), to)));
+    let inner = vertex(rings, 0, 0);
+    let quarters = (0..n_vertices).map(|v| if v == 0 { quarters } else { 4 * u32::from(v < inner) }).collect();
+    Sheet { triangles, reduction: eliminate(&variables, &constraints).unwrap(), quarters }
+}
+
+fn related(n: u32) -> Sheet {
+    let mut constraints: Vec<_> = boundary(n).iter().flat_map(|&(v, to)| fix(v, to)).collect();
+    let mut tie =
+        |a: u32, b: u32, rhs: f64| constraints.push(Constraint { terms: vec![(2 * a, 1.0), (2 * b, -1.0)], rhs });
+    let (m, q) = (n / 2, n / 6);
+    // Two neighbours in the middle, each drawn over the other by two vertices far off.
+    tie(at(n, m, m), at(n, m, q), 0.0);
+    tie(at(n, m, m), at(n, m, n - q), 6.0);
+    tie(at(n, m + 1, m), at(n, m + 1, q), 0.0);
+    tie(at(n, m + 1, m), at(n, m + 1, n - q), -6.0);
+    let quarters = vec![0; ((n + 1) * (n + 1)) as usize];
+    let variables = vec![1; 2 * ((n + 1) * (n + 1)) as usize];
+    Sheet { triangles: grid_triangles(n), reduction: eliminate(&variables, &constraints).unwrap(), quarters }
+}
+
+#[test]
+fn ties() {
+    for n in [30, 60, 100, 200] {
+        report(&format!("ties {n}"), &related(n));
+    }
+    for d in [1.5, 2.5, 4.0] {
+        report("seam fan", &fan(6, 5, 8, &[(4, 2, 4, 4.0 * DVec2::from_angle(0.5) + DVec2::new(d, -d))]));
+    }
+}
+
+fn report(label: &str, sheet: &Sheet) {
+    let t0 = std::time::Instant::now();
+    let y = solved(&sheet.problem());
+    let t1 = t0.elapsed();
+    let out = unfold(&sheet.problem(), &y, &Progress::new()).unwrap();
+    eprintln!(
+        "{label}: solve {t1:?} unfold {:?} folds {} -> {} energy {} -> {}",
+        t0.elapsed() - t1,
+        out.folds_before,
+        out.folds.len(),
+        out.energy_before,
+        out.energy
+    );
+}
+
+#[test]
+fn measure() {
+    for n in [40, 100] {
+        for drag in [5.0, 8.0, 12.0, 16.0] {
+            let v = at(n, n / 2, n / 2);
+            let mut pins = boundary(n);
+            pins.push((v, point(n, v) + drag * DVec2::from_angle(1.0)));
+            report(&format!("one {n} {drag}"), &pinned(n, &pins));
+        }
+        for gap in [1, 2, 4, 8] {
+            let (a, b) = (at(n, n / 2, n / 2), at(n, n / 2 + gap, n / 2));
+            report(&format!("swap {n} {gap}"), &pinned(n, &[(a, point(n, b)), (b, point(n, a))]));
+        }
+    }
+}
+
+#[test]
+fn fans() {
+    for (sectors, quarters) in
+        [(6, 4), (6, 3), (6, 5), (6, 6), (6, 8), (6, 9), (6, 10), (6, 11), (6, 12), (12, 12), (3, 4), (3, 5)]
+    {
+        let sheet = fan(sectors, quarters, 6, &[]);
         let y = solved(&sheet.problem());
-        let t1 = t0.elapsed();
+        let t0 = std::time::Instant::now();
         let out = unfold(&sheet.problem(), &y, &Progress::new()).unwrap();
         eprintln!(
-            "drag {label}: solve {t1:?} unfold {:?} folds {} -> {} energy {} -> {}",
-            t0.elapsed() - t1,
+            "fan {sectors} {quarters}: {:?} folds {} -> {:?} energy {} -> {}",
+            t0.elapsed(),
             out.folds_before,
-            out.folds.len(),
+            out.folds,
             out.energy_before,
             out.energy
         );

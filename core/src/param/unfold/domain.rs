@@ -108,10 +108,11 @@ impl Neighbours {
         out
     }
 
-    /// All triangles and all free variables that occur.
-    pub fn whole(&self, problem: &OrientationProblem) -> Domain {
-        let inner = (0..self.occurrences.len() as u32).filter(|&y| self.occurrences[y as usize] > 0).collect();
-        Domain { triangles: (0..problem.triangles.len() as u32).collect(), inner }
+    /// `triangles`, ascending, as one domain.
+    pub fn joined(&self, problem: &OrientationProblem, triangles: impl Iterator<Item = u32>) -> Domain {
+        let triangles: Vec<u32> = triangles.collect();
+        let inner = self.inner(problem, &triangles, &mut vec![0; self.occurrences.len()]);
+        Domain { triangles, inner }
     }
 
     /// The variables that occur in `triangles` only; `count` is all zero before and after.

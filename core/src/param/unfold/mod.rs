@@ -20,15 +20,17 @@ use rayon::prelude::*;
 
 use crate::progress::{Cancelled, Progress};
 use crate::solve::Reduction;
-use domain::{Domain, Neighbours};
+use domain::{Domain, Neighbours, variables};
 use shape::Shape;
 
 /// How many rings of triangles around folds may move, one try after the other. Three rings leave a regular vertex
 /// some 50 others to give way; beyond 24 rings the whole surface is as quick.
 const RINGS: [u32; 4] = [3, 6, 12, 24];
-/// In the whole surface triangles up to this many rings from a fold are confined from the start, the others where
-/// they turn out to fold.
-const CONFINED_RINGS: u32 = 6;
+/// Rings that may move around folds and all places that share a variable with them. Triangles there are confined
+/// from the start, others where they turn out to fold.
+const BOUND_RINGS: [u32; 2] = [6, 12];
+/// Largest domain of triangles to be solved at once: ten seconds or so.
+const WHOLE_UP_TO: usize = 50_000;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
 const WIDEST_CORNER: f64 = 175.0;
 
@@ -145,8 +147,8 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
     if y.iter().all(|y| y.is_finite()) {
         let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
         let mut best = attempt.relieve(y)?;
-        if best.folds > 0 && attempt.is_bound(&best.y) {
-            best = attempt.relieve_whole(&best.y, &folded)?;
+        if best.folds > 0 {
+            best = attempt.relieve_bound(&best.y)?;
         }
         if best.folds > 0
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
@@ -231,32 +233,59 @@ impl Attempt<'_> {
         Ok(self.candidate(y))
     }
 
-    /// Unfolds the whole at once: translations and related coordinates move too.
-    fn relieve_whole(&self, y: &[f64], confined: &[u32]) -> Result<Candidate, Cancelled> {
+    /// Unfolds together with all places that share a translation or a relation with the folds, or the whole at once
+    /// where that is about as much.
+    fn relieve_bound(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
         self.progress.report("Removing folds", 0.6);
-        let distance = self.neighbours.distance(self.problem, confined, CONFINED_RINGS);
-        let near = |t: u32| distance[t as usize] != u32::MAX;
-        let x = self.problem.reduction.expand(y);
-        let whole = self.neighbours.whole(self.problem);
+        let (problem, neighbours) = (self.problem, self.neighbours);
         let mut y = y.to_vec();
-        if let Some(values) = local::straighten(self.problem, &whole, &y, &x, self.spared, near, self.progress)? {
-            for (&i, value) in whole.inner.iter().zip(values) {
-                y[i as usize] = value;
+        for domain in neighbours.domains(problem, &self.folds(&y), RINGS[RINGS.len() - 1]) {
+            // Folds of this domain may have gone with those of an earlier one.
+            let mut folds = self.folds(&y);
+            folds.retain(|t| domain.triangles.binary_search(t).is_ok());
+            let bound = self.bound_variables(&domain, &folds);
+            if bound.is_empty() {
+                continue;
+            }
+            let carries = |&t: &u32| variables(problem, t).iter().any(|y| bound.binary_search(y).is_ok());
+            let mut seeds = folds;
+            seeds.extend((0..problem.triangles.len() as u32).filter(carries));
+            for rings in BOUND_RINGS {
+                let distance = neighbours.distance(problem, &seeds, rings);
+                let reached = |t: u32| distance[t as usize] != u32::MAX;
+                let mut joined =
+                    neighbours.joined(problem, (0..problem.triangles.len() as u32).filter(|&t| reached(t)));
+                if joined.triangles.len() > WHOLE_UP_TO {
+                    break;
+                }
+                if 2 * joined.triangles.len() > problem.triangles.len() {
+                    joined = neighbours.joined(problem, 0..problem.triangles.len() as u32);
+                }
+                let x = problem.reduction.expand(&y);
+                if let Some(values) = local::straighten(problem, &joined, &y, &x, self.spared, reached, self.progress)?
+                {
+                    for (&i, value) in joined.inner.iter().zip(values) {
+                        y[i as usize] = value;
+                    }
+                    break;
+                }
+                if joined.triangles.len() == problem.triangles.len() {
+                    break;
+                }
             }
         }
         Ok(self.candidate(y))
     }
 
-    /// Whether variables that no domain holds occur near the folds of `y`.
-    fn is_bound(&self, y: &[f64]) -> bool {
-        let folds = self.folds(y);
-        let widest = RINGS[RINGS.len() - 1];
-        let distance = self.neighbours.distance(self.problem, &folds, RINGS[0]);
-        let domains = self.neighbours.domains(self.problem, &folds, widest);
-        domains.iter().any(|d| {
-            let near = d.triangles.iter().filter(|t| distance[**t as usize] != u32::MAX);
-            near.flat_map(|&t| domain::variables(self.problem, t)).any(|y| d.inner.binary_search(&y).is_err())
-        })
+    /// The variables near folds that occur outside their widest domain too, ascending.
+    fn bound_variables(&self, domain: &Domain, folds: &[u32]) -> Vec<u32> {
+        let distance = self.neighbours.distance(self.problem, folds, RINGS[0]);
+        let near = domain.triangles.iter().filter(|t| distance[**t as usize] != u32::MAX);
+        let mut out: Vec<u32> = near.flat_map(|&t| variables(self.problem, t)).collect();
+        out.sort_unstable();
+        out.dedup();
+        out.retain(|y| domain.inner.binary_search(y).is_err());
+        out
     }
 
     fn candidate(&self, y: Vec<f64>) -> Candidate {

@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::Reduction;
 use domain::{Domain, Neighbours, variables};
+use local::Local;
 use shape::Shape;
 
 /// How many rings of triangles around folds may move, one try after the other. Three rings leave a regular vertex
@@ -29,6 +30,8 @@ const RINGS: [u32; 4] = [3, 6, 12, 24];
 /// Rings that may move around folds and all places that share a variable with them. Triangles there are confined
 /// from the start, others where they turn out to fold.
 const BOUND_RINGS: [u32; 2] = [6, 12];
+/// Rings that may move where not all folds can go.
+const RELAXED_RINGS: u32 = 6;
 /// Largest domain of triangles to be solved at once: ten seconds or so.
 const WHOLE_UP_TO: usize = 50_000;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
@@ -150,6 +153,9 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
         if best.folds > 0 {
             best = attempt.relieve_bound(&best.y)?;
         }
+        if best.folds > 0 {
+            best = attempt.relax(&best.y)?;
+        }
         if best.folds > 0
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
         {
@@ -217,20 +223,38 @@ impl Attempt<'_> {
             self.progress.report("Removing folds", (i as f64 + 0.5) / (RINGS.len() as f64 + 2.0));
             let domains = self.neighbours.domains(self.problem, &folds, rings);
             // A domain that could not grow will not do better.
-            let grown: Vec<&Domain> = domains.iter().filter(|d| !before.contains(d)).collect();
-            let x = self.problem.reduction.expand(&y);
-            let found: Vec<_> = grown
-                .par_iter()
-                .map(|d| local::straighten(self.problem, d, &y, &x, self.spared, |_| true, self.progress))
-                .collect::<Result<_, _>>()?;
-            for (domain, values) in grown.into_iter().zip(found) {
-                for (&i, value) in domain.inner.iter().zip(values.into_iter().flatten()) {
-                    y[i as usize] = value;
-                }
-            }
+            let grown: Vec<Domain> = domains.iter().filter(|d| !before.contains(d)).cloned().collect();
+            self.change(&mut y, &grown, |local| local.straighten(|_| true, self.progress))?;
             before = domains;
         }
         Ok(self.candidate(y))
+    }
+
+    /// Unfolds what can be unfolded beside folds that cannot.
+    fn relax(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
+        self.progress.report("Removing folds", 0.7);
+        let mut y = y.to_vec();
+        let domains = self.neighbours.domains(self.problem, &self.folds(&y), RELAXED_RINGS);
+        self.change(&mut y, &domains, |local| local.relax(self.progress))?;
+        Ok(self.candidate(y))
+    }
+
+    /// Changes the inner variables of disjoint domains to the values found for each, if any.
+    fn change(
+        &self,
+        y: &mut [f64],
+        domains: &[Domain],
+        find: impl Fn(Local) -> Result<Option<Vec<f64>>, Cancelled> + Sync,
+    ) -> Result<(), Cancelled> {
+        let x = self.problem.reduction.expand(y);
+        let local = |domain| Local { problem: self.problem, domain, y, x: &x, spared: self.spared };
+        let found = domains.par_iter().map(|d| find(local(d))).collect::<Result<Vec<_>, _>>()?;
+        for (domain, values) in domains.iter().zip(found) {
+            for (&i, value) in domain.inner.iter().zip(values.into_iter().flatten()) {
+                y[i as usize] = value;
+            }
+        }
+        Ok(())
     }
 
     /// Unfolds together with all places that share a translation or a relation with the folds, or the whole at once
@@ -261,15 +285,10 @@ impl Attempt<'_> {
                 if 2 * joined.triangles.len() > problem.triangles.len() {
                     joined = neighbours.joined(problem, 0..problem.triangles.len() as u32);
                 }
-                let x = problem.reduction.expand(&y);
-                if let Some(values) = local::straighten(problem, &joined, &y, &x, self.spared, reached, self.progress)?
-                {
-                    for (&i, value) in joined.inner.iter().zip(values) {
-                        y[i as usize] = value;
-                    }
-                    break;
-                }
-                if joined.triangles.len() == problem.triangles.len() {
+                let before = self.folds(&y).len();
+                let whole = joined.triangles.len() == problem.triangles.len();
+                self.change(&mut y, &[joined], |local| local.straighten(reached, self.progress))?;
+                if whole || self.folds(&y).len() < before {
                     break;
                 }
             }

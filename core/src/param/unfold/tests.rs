@@ -220,16 +220,22 @@ fn report(label: &str, sheet: &Sheet) {
 
 #[test]
 fn measure() {
-    for n in [40, 100] {
-        for drag in [5.0, 8.0, 12.0, 16.0] {
-            let v = at(n, n / 2, n / 2);
+    let n = 100;
+    for ratio in [1.0, 10.0] {
+        for (gap, drag) in [(16, 3.0), (16, 5.0), (8, 2.0), (8, 3.0), (8, 4.0), (5, 2.0), (5, 3.0), (5, 5.0)] {
             let mut pins = boundary(n);
-            pins.push((v, point(n, v) + drag * DVec2::from_angle(1.0)));
-            report(&format!("one {n} {drag}"), &pinned(n, &pins));
-        }
-        for gap in [1, 2, 4, 8] {
-            let (a, b) = (at(n, n / 2, n / 2), at(n, n / 2 + gap, n / 2));
-            report(&format!("swap {n} {gap}"), &pinned(n, &[(a, point(n, b)), (b, point(n, a))]));
+            for j in 1..n / gap {
+                for i in 1..n / gap {
+                    let v = at(n, gap * i, gap * j);
+                    let angle = f64::from(7 * i + 5 * j * j);
+                    pins.push((v, point(n, v) + drag * DVec2::from_angle(angle)));
+                }
+            }
+            let mut sheet = pinned(n, &pins);
+            for t in &mut sheet.triangles {
+                t.ratio = ratio;
+            }
+            report(&format!("ratio {ratio} gap {gap} drag {drag}"), &sheet);
         }
     }
 }

@@ -32,6 +32,8 @@ const RINGS: [u32; 4] = [3, 6, 12, 24];
 const BOUND_RINGS: [u32; 2] = [6, 12];
 /// Rings that may move where not all folds can go.
 const RELAXED_RINGS: u32 = 6;
+/// A domain of more triangles, many folds that is, does not grow before those are gone that hinder no other.
+const LARGE: usize = 2000;
 /// Largest domain of triangles to be solved at once: ten seconds or so.
 const WHOLE_UP_TO: usize = 50_000;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
@@ -224,7 +226,10 @@ impl Attempt<'_> {
             let domains = self.neighbours.domains(self.problem, &folds, rings);
             // A domain that could not grow will not do better.
             let grown: Vec<Domain> = domains.iter().filter(|d| !before.contains(d)).cloned().collect();
-            self.change(&mut y, &grown, |local| local.straighten(|_| true, self.progress))?;
+            self.change(&mut y, &grown, |local| match local.straighten(|_| true, self.progress)? {
+                None if local.domain.triangles.len() > LARGE => local.relax(self.progress),
+                found => Ok(found),
+            })?;
             before = domains;
         }
         Ok(self.candidate(y))

@@ -109,8 +109,7 @@ impl Neighbours {
     }
 
     /// `triangles`, ascending, as one domain.
-    pub fn joined(&self, problem: &OrientationProblem, triangles: impl Iterator<Item = u32>) -> Domain {
-        let triangles: Vec<u32> = triangles.collect();
+    pub fn joined(&self, problem: &OrientationProblem, triangles: Vec<u32>) -> Domain {
         let inner = self.inner(problem, &triangles, &mut vec![0; self.occurrences.len()]);
         Domain { triangles, inner }
     }

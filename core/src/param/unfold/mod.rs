@@ -3,8 +3,9 @@
 //! Least squares do not care for orientation: near fixed points triangles may be turned over. Around each group of
 //! such triangles the energy is minimised again with everything outside kept in place and every triangle inside
 //! confined to a convex set of orientation preserving maps (Campen, section 6.5.3). Where no such map exists the
-//! surroundings grow, at last to the whole surface with its seams and relations. What remains is stiffened and then
-//! tried again. The outcome never has more folds than the input; for each that remains it tells why.
+//! surroundings grow, at last by the places that seams and relations tie to them. Then as many folds go as can be had
+//! beside those that cannot, and the same is tried from a stiffened map. The outcome never has more folds than the
+//! input; for each that remains it tells why.
 
 mod domain;
 mod local;
@@ -34,8 +35,8 @@ const BOUND_RINGS: [u32; 2] = [6, 12];
 const RELAXED_RINGS: u32 = 6;
 /// A domain of more triangles, many folds that is, does not grow before those are gone that hinder no other.
 const LARGE: usize = 2000;
-/// Largest domain of triangles to be solved at once: ten seconds or so.
-const WHOLE_UP_TO: usize = 50_000;
+/// Most triangles to be solved at once where relations are to move: some seconds.
+const AT_ONCE: usize = 25_000;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
 const WIDEST_CORNER: f64 = 175.0;
 
@@ -282,16 +283,17 @@ impl Attempt<'_> {
             for rings in BOUND_RINGS {
                 let distance = neighbours.distance(problem, &seeds, rings);
                 let reached = |t: u32| distance[t as usize] != u32::MAX;
-                let mut joined =
-                    neighbours.joined(problem, (0..problem.triangles.len() as u32).filter(|&t| reached(t)));
-                if joined.triangles.len() > WHOLE_UP_TO {
+                let all = 0..problem.triangles.len() as u32;
+                let mut triangles: Vec<u32> = all.clone().filter(|&t| reached(t)).collect();
+                let whole = 2 * triangles.len() > problem.triangles.len();
+                if whole {
+                    triangles = all.collect();
+                }
+                if triangles.len() > AT_ONCE {
                     break;
                 }
-                if 2 * joined.triangles.len() > problem.triangles.len() {
-                    joined = neighbours.joined(problem, 0..problem.triangles.len() as u32);
-                }
                 let before = self.folds(&y).len();
-                let whole = joined.triangles.len() == problem.triangles.len();
+                let joined = neighbours.joined(problem, triangles);
                 self.change(&mut y, &[joined], |local| local.straighten(reached, self.progress))?;
                 if whole || self.folds(&y).len() < before {
                     break;

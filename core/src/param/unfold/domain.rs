@@ -108,10 +108,10 @@ impl Neighbours {
         out
     }
 
-    /// All triangles and all free variables that occur.
-    pub fn whole(&self, problem: &OrientationProblem) -> Domain {
-        let inner = (0..self.occurrences.len() as u32).filter(|&y| self.occurrences[y as usize] > 0).collect();
-        Domain { triangles: (0..problem.triangles.len() as u32).collect(), inner }
+    /// `triangles`, ascending, as one domain.
+    pub fn joined(&self, problem: &OrientationProblem, triangles: Vec<u32>) -> Domain {
+        let inner = self.inner(problem, &triangles, &mut vec![0; self.occurrences.len()]);
+        Domain { triangles, inner }
     }
 
     /// The variables that occur in `triangles` only; `count` is all zero before and after.
@@ -135,7 +135,7 @@ impl Neighbours {
 }
 
 /// The free variables that occur in a triangle, each once.
-fn variables(problem: &OrientationProblem, t: u32) -> Vec<u32> {
+pub(super) fn variables(problem: &OrientationProblem, t: u32) -> Vec<u32> {
     let corners = problem.triangles[t as usize].corners.iter().flatten();
     let mut out: Vec<u32> =
         corners.flat_map(|&(x, _)| problem.reduction.expression(x as usize).0.iter().map(|term| term.0)).collect();

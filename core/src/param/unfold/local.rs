@@ -25,6 +25,9 @@ const LAZY_ROUNDS: usize = 6;
 /// How often the frames are turned to the map found.
 const TURNS: usize = 1;
 
+/// The price of leaving a cone by the size of the target, relative to the energy of a collapsed triangle: above what
+/// constraints that can be satisfied usually cost, so that only those are violated that cannot.
+const PRICE: f64 = 100.0;
 /// Sums below this, relative to their terms, have cancelled.
 const CANCELLED: f64 = 1e-9;
 
@@ -123,62 +126,114 @@ impl Cone {
     }
 }
 
-/// Finds the values of `domain`'s inner variables of least energy for which none of its triangles folds but those
-/// `spared`; `None` where there are none. Constraints are imposed where `confined` says so, and where need be.
-pub(super) fn straighten(
-    problem: &OrientationProblem,
-    domain: &Domain,
-    y: &[f64],
-    x: &[f64],
-    spared: &[bool],
-    confined: impl Fn(u32) -> bool,
-    progress: &Progress,
-) -> Result<Option<Vec<f64>>, Cancelled> {
-    let unit = unit(problem, domain);
-    let pieces: Vec<Piece> = domain.triangles.iter().map(|&t| Piece::new(problem, domain, t, x, unit)).collect();
-    let shape = |p: &Piece, step: &[f64]| Shape::new(p.gradients(step), problem.triangles[p.triangle as usize].lengths);
-    let none = vec![0.0; domain.inner.len()];
-    let bound = |p: &Piece| !spared[p.triangle as usize];
-    if pieces.iter().any(|p| bound(p) && p.is_fixed() && shape(p, &none).is_folded()) {
-        return Ok(None);
-    }
-    let mut program = energy(problem, &pieces, domain.inner.len());
-    let mut imposed: Vec<bool> = pieces.iter().map(|p| bound(p) && !p.is_fixed() && confined(p.triangle)).collect();
-    let mut at = none;
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    let mut turns = 0;
-    for _ in 0..LAZY_ROUNDS {
-        let chosen = pieces.iter().zip(&imposed).filter(|(_, imposed)| **imposed);
-        program.cones = chosen
-            .map(|(p, _)| Cone::about(&shape(p, &at)).constraint(p, problem.triangles[p.triangle as usize].lengths))
-            .collect();
-        let Some(step) = program.minimise(progress)? else { break };
-        let mut violated = false;
-        for (p, imposed) in pieces.iter().zip(&mut imposed) {
-            if bound(p) && shape(p, &step).is_folded() {
-                // A constraint that is imposed and yet violated is the solver's failure.
-                if *imposed || p.is_fixed() {
-                    return Ok(best.map(|b| b.1));
+/// A map, and the part of it that may change.
+#[derive(Clone, Copy)]
+pub(super) struct Local<'a> {
+    pub problem: &'a OrientationProblem<'a>,
+    pub domain: &'a Domain,
+    /// The free variables.
+    pub y: &'a [f64],
+    /// All variables.
+    pub x: &'a [f64],
+    /// Triangles that may be folded.
+    pub spared: &'a [bool],
+}
+
+impl Local<'_> {
+    /// Values of the inner variables of least energy for which no triangle folds; `None` where there are none.
+    /// Constraints are imposed where `confined` says so, and where need be.
+    pub fn straighten(
+        &self,
+        confined: impl Fn(u32) -> bool,
+        progress: &Progress,
+    ) -> Result<Option<Vec<f64>>, Cancelled> {
+        let unit = unit(self.problem, self.domain);
+        let pieces = self.pieces(unit);
+        let mut at = vec![0.0; self.domain.inner.len()];
+        let bound = |p: &Piece| !self.spared[p.triangle as usize];
+        if pieces.iter().any(|p| bound(p) && p.is_fixed() && self.shape(p, &at).is_folded()) {
+            return Ok(None);
+        }
+        let mut program = energy(self.problem, &pieces, self.domain.inner.len());
+        let mut imposed: Vec<bool> = pieces.iter().map(|p| bound(p) && !p.is_fixed() && confined(p.triangle)).collect();
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        let mut turns = 0;
+        for _ in 0..LAZY_ROUNDS {
+            let chosen = pieces.iter().zip(&imposed).filter(|(_, imposed)| **imposed);
+            program.cones = chosen.map(|(p, _)| self.constraint(p, &at)).collect();
+            let Some(step) = program.minimise(progress)? else { break };
+            let mut violated = false;
+            for (p, imposed) in pieces.iter().zip(&mut imposed) {
+                if bound(p) && self.shape(p, &step).is_folded() {
+                    // A constraint that is imposed and yet violated is the solver's failure.
+                    if *imposed || p.is_fixed() {
+                        return Ok(best.map(|b| self.values(&b.1, unit)));
+                    }
+                    *imposed = true;
+                    violated = true;
                 }
-                *imposed = true;
-                violated = true;
             }
+            if violated {
+                continue;
+            }
+            let value = self.energy(&pieces, &step);
+            if best.as_ref().is_none_or(|b| value < b.0) {
+                at.clone_from(&step);
+                best = Some((value, step));
+            }
+            if turns == TURNS {
+                break;
+            }
+            turns += 1;
         }
-        if violated {
-            continue;
-        }
-        let gradients = pieces.iter().map(|p| problem.triangles[p.triangle as usize].energy(p.gradients(&step)));
-        let value: f64 = gradients.sum();
-        if best.as_ref().is_none_or(|b| value < b.0) {
-            at.clone_from(&step);
-            best = Some((value, domain.inner.iter().zip(&step).map(|(&i, s)| y[i as usize] + s * unit).collect()));
-        }
-        if turns == TURNS {
-            break;
-        }
-        turns += 1;
+        Ok(best.map(|b| self.values(&b.1, unit)))
     }
-    Ok(best.map(|b| b.1))
+
+    /// Values of the inner variables for which as few triangles fold as can be had at once: those folded now may
+    /// stay so at a price that grows with the distance from their cones, all others keep to theirs. `None` unless
+    /// fewer triangles fold.
+    pub fn relax(&self, progress: &Progress) -> Result<Option<Vec<f64>>, Cancelled> {
+        let unit = unit(self.problem, self.domain);
+        let pieces = self.pieces(unit);
+        let none = vec![0.0; self.domain.inner.len()];
+        let mut program = energy(self.problem, &pieces, none.len());
+        let folds = |step: &[f64]| pieces.iter().filter(|p| self.shape(p, step).is_folded()).count();
+        for p in pieces.iter().filter(|p| !self.spared[p.triangle as usize] && !p.is_fixed()) {
+            let mut constraint = self.constraint(p, &none);
+            if self.shape(p, &none).is_folded() {
+                let slack = program.linear.len() as u32;
+                program.linear.push(PRICE);
+                constraint[0].terms.push((slack, 1.0));
+                let positive = Affine { terms: vec![(slack, 1.0)], constant: 0.0 };
+                program.cones.push([positive, Affine::default(), Affine::default()]);
+            }
+            program.cones.push(constraint);
+        }
+        let Some(mut step) = program.minimise(progress)? else { return Ok(None) };
+        step.truncate(none.len());
+        Ok((folds(&step) < folds(&none)).then(|| self.values(&step, unit)))
+    }
+
+    fn pieces(&self, unit: f64) -> Vec<Piece> {
+        self.domain.triangles.iter().map(|&t| Piece::new(self.problem, self.domain, t, self.x, unit)).collect()
+    }
+
+    fn shape(&self, piece: &Piece, step: &[f64]) -> Shape {
+        Shape::new(piece.gradients(step), self.problem.triangles[piece.triangle as usize].lengths)
+    }
+
+    fn constraint(&self, piece: &Piece, at: &[f64]) -> [Affine; 3] {
+        let lengths = self.problem.triangles[piece.triangle as usize].lengths;
+        Cone::about(&self.shape(piece, at)).constraint(piece, lengths)
+    }
+
+    fn energy(&self, pieces: &[Piece], step: &[f64]) -> f64 {
+        pieces.iter().map(|p| self.problem.triangles[p.triangle as usize].energy(p.gradients(step))).sum()
+    }
+
+    fn values(&self, step: &[f64], unit: f64) -> Vec<f64> {
+        self.domain.inner.iter().zip(step).map(|(&i, s)| self.y[i as usize] + s * unit).collect()
+    }
 }
 
 /// Whether the constraints decide that a triangle is folded: nothing in it can vary, or one coordinate is constant.

@@ -3,8 +3,9 @@
 //! Least squares do not care for orientation: near fixed points triangles may be turned over. Around each group of
 //! such triangles the energy is minimised again with everything outside kept in place and every triangle inside
 //! confined to a convex set of orientation preserving maps (Campen, section 6.5.3). Where no such map exists the
-//! surroundings grow, at last to the whole surface with its seams and relations. What remains is stiffened and then
-//! tried again. The outcome never has more folds than the input; for each that remains it tells why.
+//! surroundings grow, at last by the places that seams and relations tie to them. Then as many folds go as can be had
+//! beside those that cannot, and the same is tried from a stiffened map. The outcome never has more folds than the
+//! input; for each that remains it tells why.
 
 mod domain;
 mod local;
@@ -20,15 +21,22 @@ use rayon::prelude::*;
 
 use crate::progress::{Cancelled, Progress};
 use crate::solve::Reduction;
-use domain::{Domain, Neighbours};
+use domain::{Domain, Neighbours, variables};
+use local::Local;
 use shape::Shape;
 
 /// How many rings of triangles around folds may move, one try after the other. Three rings leave a regular vertex
 /// some 50 others to give way; beyond 24 rings the whole surface is as quick.
 const RINGS: [u32; 4] = [3, 6, 12, 24];
-/// In the whole surface triangles up to this many rings from a fold are confined from the start, the others where
-/// they turn out to fold.
-const CONFINED_RINGS: u32 = 6;
+/// Rings that may move around folds and all places that share a variable with them. Triangles there are confined
+/// from the start, others where they turn out to fold.
+const BOUND_RINGS: [u32; 2] = [6, 12];
+/// Rings that may move where not all folds can go.
+const RELAXED_RINGS: u32 = 6;
+/// A domain of more triangles, many folds that is, does not grow before those are gone that hinder no other.
+const LARGE: usize = 2000;
+/// Most triangles to be solved at once where relations are to move: some seconds.
+const AT_ONCE: usize = 25_000;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
 const WIDEST_CORNER: f64 = 175.0;
 
@@ -145,6 +153,12 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
     if y.iter().all(|y| y.is_finite()) {
         let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
         let mut best = attempt.relieve(y)?;
+        if best.folds > 0 {
+            best = attempt.relieve_bound(&best.y)?;
+        }
+        if best.folds > 0 {
+            best = attempt.relax(&best.y)?;
+        }
         if best.folds > 0
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
         {
@@ -200,10 +214,9 @@ struct Attempt<'a> {
 }
 
 impl Attempt<'_> {
-    /// Unfolds domain by domain, larger and larger ones, at last the whole.
+    /// Unfolds domain by domain, larger and larger ones.
     fn relieve(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
         let mut y = y.to_vec();
-        let first = self.folds(&y);
         let mut before: Vec<Domain> = Vec::new();
         for (i, rings) in RINGS.into_iter().enumerate() {
             let folds = self.folds(&y);
@@ -213,32 +226,96 @@ impl Attempt<'_> {
             self.progress.report("Removing folds", (i as f64 + 0.5) / (RINGS.len() as f64 + 2.0));
             let domains = self.neighbours.domains(self.problem, &folds, rings);
             // A domain that could not grow will not do better.
-            let grown: Vec<&Domain> = domains.iter().filter(|d| !before.contains(d)).collect();
-            let x = self.problem.reduction.expand(&y);
-            let found: Vec<_> = grown
-                .par_iter()
-                .map(|d| local::straighten(self.problem, d, &y, &x, self.spared, |_| true, self.progress))
-                .collect::<Result<_, _>>()?;
-            for (domain, values) in grown.into_iter().zip(found) {
-                for (&i, value) in domain.inner.iter().zip(values.into_iter().flatten()) {
-                    y[i as usize] = value;
-                }
-            }
+            let grown: Vec<Domain> = domains.iter().filter(|d| !before.contains(d)).cloned().collect();
+            self.change(&mut y, &grown, |local| match local.straighten(|_| true, self.progress)? {
+                None if local.domain.triangles.len() > LARGE => local.relax(self.progress),
+                found => Ok(found),
+            })?;
             before = domains;
         }
-        if !self.folds(&y).is_empty() {
-            self.progress.report("Removing folds", 0.7);
-            let distance = self.neighbours.distance(self.problem, &first, CONFINED_RINGS);
-            let near = |t: u32| distance[t as usize] != u32::MAX;
-            let x = self.problem.reduction.expand(&y);
-            let whole = self.neighbours.whole(self.problem);
-            if let Some(values) = local::straighten(self.problem, &whole, &y, &x, self.spared, near, self.progress)? {
-                for (&i, value) in whole.inner.iter().zip(values) {
-                    y[i as usize] = value;
+        Ok(self.candidate(y))
+    }
+
+    /// Unfolds what can be unfolded beside folds that cannot.
+    fn relax(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
+        self.progress.report("Removing folds", 0.7);
+        let mut y = y.to_vec();
+        let domains = self.neighbours.domains(self.problem, &self.folds(&y), RELAXED_RINGS);
+        self.change(&mut y, &domains, |local| local.relax(self.progress))?;
+        Ok(self.candidate(y))
+    }
+
+    /// Changes the inner variables of disjoint domains to the values found for each, if any.
+    fn change(
+        &self,
+        y: &mut [f64],
+        domains: &[Domain],
+        find: impl Fn(Local) -> Result<Option<Vec<f64>>, Cancelled> + Sync,
+    ) -> Result<(), Cancelled> {
+        let x = self.problem.reduction.expand(y);
+        let local = |domain| Local { problem: self.problem, domain, y, x: &x, spared: self.spared };
+        let found = domains.par_iter().map(|d| find(local(d))).collect::<Result<Vec<_>, _>>()?;
+        for (domain, values) in domains.iter().zip(found) {
+            for (&i, value) in domain.inner.iter().zip(values.into_iter().flatten()) {
+                y[i as usize] = value;
+            }
+        }
+        Ok(())
+    }
+
+    /// Unfolds together with all places that share a translation or a relation with the folds, or the whole at once
+    /// where that is about as much.
+    fn relieve_bound(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
+        self.progress.report("Removing folds", 0.6);
+        let (problem, neighbours) = (self.problem, self.neighbours);
+        let mut y = y.to_vec();
+        for domain in neighbours.domains(problem, &self.folds(&y), RINGS[RINGS.len() - 1]) {
+            // Folds of this domain may have gone with those of an earlier one.
+            let mut folds = self.folds(&y);
+            folds.retain(|t| domain.triangles.binary_search(t).is_ok());
+            let bound = self.bound_variables(&domain, &folds);
+            if bound.is_empty() {
+                continue;
+            }
+            let carries = |&t: &u32| variables(problem, t).iter().any(|y| bound.binary_search(y).is_ok());
+            let mut seeds = folds;
+            seeds.extend((0..problem.triangles.len() as u32).filter(carries));
+            for rings in BOUND_RINGS {
+                let distance = neighbours.distance(problem, &seeds, rings);
+                let reached = |t: u32| distance[t as usize] != u32::MAX;
+                let all = 0..problem.triangles.len() as u32;
+                let mut triangles: Vec<u32> = all.clone().filter(|&t| reached(t)).collect();
+                let whole = 2 * triangles.len() > problem.triangles.len();
+                if whole {
+                    triangles = all.collect();
+                }
+                if triangles.len() > AT_ONCE {
+                    break;
+                }
+                let before = self.folds(&y).len();
+                let joined = neighbours.joined(problem, triangles);
+                self.change(&mut y, &[joined], |local| local.straighten(reached, self.progress))?;
+                if whole || self.folds(&y).len() < before {
+                    break;
                 }
             }
         }
-        Ok(Candidate { folds: self.folds(&y).len(), energy: self.problem.energy(&y), y })
+        Ok(self.candidate(y))
+    }
+
+    /// The variables near folds that occur outside their widest domain too, ascending.
+    fn bound_variables(&self, domain: &Domain, folds: &[u32]) -> Vec<u32> {
+        let distance = self.neighbours.distance(self.problem, folds, RINGS[0]);
+        let near = domain.triangles.iter().filter(|t| distance[**t as usize] != u32::MAX);
+        let mut out: Vec<u32> = near.flat_map(|&t| variables(self.problem, t)).collect();
+        out.sort_unstable();
+        out.dedup();
+        out.retain(|y| domain.inner.binary_search(y).is_err());
+        out
+    }
+
+    fn candidate(&self, y: Vec<f64>) -> Candidate {
+        Candidate { folds: self.folds(&y).len(), energy: self.problem.energy(&y), y }
     }
 
     /// Folds that there is hope for.

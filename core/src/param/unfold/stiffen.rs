@@ -11,6 +11,8 @@ use crate::solve::{SparseHermitian, SpdSymbolic};
 
 /// Rounds of solving; what has not unfolded by then is held by constraints.
 const ROUNDS: usize = 12;
+/// Rounds without fewer folds after which there is little hope for more.
+const PATIENCE: usize = 4;
 /// By how much the weight of a folded triangle grows in a round.
 const GROWTH: f64 = 3.0;
 /// Rings around folds in which the growth fades out, halved from one to the next, so that no fold moves next door.
@@ -26,6 +28,7 @@ pub(super) fn stiffen(
     let mut factor = vec![1.0; problem.triangles.len()];
     let mut best: Option<(usize, Vec<f64>)> = None;
     let mut symbolic: Option<SpdSymbolic> = None;
+    let mut since = 0;
     for _ in 0..ROUNDS {
         progress.check()?;
         let (matrix, rhs) = assemble(problem, &factor);
@@ -43,8 +46,10 @@ pub(super) fn stiffen(
         let distance = neighbours.distance(problem, &folded, RINGS);
         if best.as_ref().is_none_or(|b| count < b.0) {
             best = Some((count, solution));
+            since = 0;
         }
-        if count == 0 {
+        since += 1;
+        if count == 0 || since > PATIENCE {
             break;
         }
         for (factor, d) in factor.iter_mut().zip(distance).filter(|(_, d)| *d <= RINGS) {

@@ -11,8 +11,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// How close to its end, as a fraction of the edge, a line crosses an edge before it goes through the vertex
-/// instead, and how large an angle with an edge, in radians, is none: what parts a triangle less evenly than this
-/// is no use to anyone, and the vertex moves in the map by less than folds it.
+/// instead: what parts a triangle less evenly than this is no use to anyone.
 const SNAP: f64 = 1e-4;
 /// Distance from a line, as a fraction of the whole map's size, that is rounding of the map itself.
 const EXACT: f64 = 1e-9;
@@ -170,7 +169,7 @@ impl Isolines<'_> {
     fn side(&self, edge: DVec2, heading: u8) -> Side {
         let d = direction(heading);
         let (off, length) = (d.perp_dot(edge), edge.length());
-        if off.abs() <= (SNAP * length).max(self.exact).min(WITHIN * length) {
+        if off.abs() <= self.exact.min(WITHIN * length) {
             if d.dot(edge) > 0.0 { Side::Ahead } else { Side::Behind }
         } else if off > 0.0 {
             Side::Left
@@ -304,9 +303,8 @@ impl Isolines<'_> {
                 At::Leaving(h) => {
                     let t = self.crossing(h, &line);
                     let (right, left) = (self.uv(h), self.uv(mesh.next(h)));
-                    let close = SNAP.max(self.exact / (line.off(left) - line.off(right)).abs()).min(WITHIN);
-                    if t <= close || t >= 1.0 - close {
-                        at = At::Vertex(if t <= close { h } else { mesh.next(h) });
+                    if let Some(end) = self.close(h, t, &line) {
+                        at = At::Vertex(end);
                         continue;
                     }
                     steps.push(Step::Edge(h, line));
@@ -332,6 +330,41 @@ impl Isolines<'_> {
     pub fn crossing(&self, h: HalfedgeId, line: &Line) -> f64 {
         let (right, left) = (line.off(self.uv(h)), line.off(self.uv(self.mesh.next(h))));
         -right / (left - right)
+    }
+
+    /// The corner of the triangle of `h`, at an end of `h`, that a line which crosses `h` at `t` goes through instead.
+    fn close(&self, h: HalfedgeId, t: f64, line: &Line) -> Option<HalfedgeId> {
+        let end = if t < 0.5 { h } else { self.mesh.next(h) };
+        let off = line.off(self.uv(end));
+        let rounding = self.exact / (line.off(self.uv(self.mesh.next(h))) - line.off(self.uv(h))).abs();
+        let away = t.min(1.0 - t);
+        let goes =
+            away <= rounding.min(WITHIN) || away <= SNAP && (away <= 0.0 || self.may_move(end, off, line.heading));
+        goes.then_some(end)
+    }
+
+    /// Whether the origin of a corner can be moved to a line that it is `off` without turning a triangle over.
+    fn may_move(&self, corner: HalfedgeId, off: f64, heading: u8) -> bool {
+        self.fan(corner, -off * direction((heading + 1) % 4)).into_iter().all(|(h, shift)| {
+            let (a, b, c) = (self.uv(h), self.uv(self.mesh.next(h)), self.uv(self.mesh.prev(h)));
+            (b - a).perp_dot(c - a) <= 0.0 || (b - a - shift).perp_dot(c - a - shift) > 0.0
+        })
+    }
+
+    /// All corners at the origin of `corner`, each with a vector that is given in its chart as `vector`.
+    pub fn fan(&self, corner: HalfedgeId, vector: DVec2) -> Vec<(HalfedgeId, DVec2)> {
+        let mut fan = vec![(corner, vector)];
+        for clockwise in [false, true] {
+            let (mut at, mut vector) = (corner, vector);
+            while let Some((next, change)) = if clockwise { self.cw(at) } else { self.ccw(at) } {
+                (at, vector) = (next, turn(vector, i32::from(change.turns)));
+                if at == corner {
+                    return fan;
+                }
+                fan.push((at, vector));
+            }
+        }
+        fan
     }
 
     fn leave(&self, corner: HalfedgeId, exit: Exit) -> At {

@@ -9,7 +9,7 @@ mod weld;
 
 pub use emerge::{EmergeError, Emerged, emerge};
 pub use patches::{RectangleError, map_rectangles};
-pub use trace::{ArcChain, TraceError, Traced, preview_arcs, trace_arcs};
+pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
 
 #[cfg(test)]
 mod samples;

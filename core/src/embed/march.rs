@@ -202,7 +202,10 @@ impl Isolines<'_> {
     /// The isolines that leave a vertex, counter-clockwise. On the boundary the first and the last run along it,
     /// whatever the map says.
     pub fn slots(&self, v: VertexId) -> Vec<Slot> {
-        let mut slots = Vec::new();
+        let mut slots: Vec<Slot> = Vec::new();
+        // Going round, a heading that a fold passes back over and then again is one and the same: such a passage
+        // back takes the slot before it away, and one before all slots the last.
+        let mut before_all = 0;
         for corner in self.mesh.outgoing(v) {
             let all = (0..4).filter_map(|heading| Some(Slot { corner, heading, exit: self.exit(corner, heading)? }));
             let mut here: Vec<Slot> = all.collect();
@@ -210,7 +213,11 @@ impl Isolines<'_> {
             let begin = here.iter().position(|s| here.iter().all(|o| (o.heading + 1) % 4 != s.heading));
             here.rotate_left(begin.unwrap_or(0));
             slots.extend(here);
+            let back = if self.through_folds { self.passed_back(corner) } else { 0 };
+            before_all += back.saturating_sub(slots.len());
+            slots.truncate(slots.len().saturating_sub(back));
         }
+        slots.truncate(slots.len().saturating_sub(before_all));
         if self.mesh.is_boundary_vertex(v) {
             let first = self.mesh.vertex_halfedge(v);
             let last = self.mesh.outgoing(v).last().unwrap_or(first);
@@ -225,6 +232,16 @@ impl Isolines<'_> {
             slots.push(Slot { corner: last, heading: nearest(edge), exit: Exit::Back });
         }
         slots
+    }
+
+    /// The number of headings that a corner of a triangle that is turned over passes clockwise.
+    fn passed_back(&self, corner: HalfedgeId) -> usize {
+        let (w, a, b) = (self.uv(corner), self.uv(self.mesh.next(corner)), self.uv(self.mesh.prev(corner)));
+        if (a - w).perp_dot(b - w) >= 0.0 {
+            return 0;
+        }
+        let within = |k: &u8| direction(*k).perp_dot(a - w) > 0.0 && direction(*k).perp_dot(b - w) < 0.0;
+        (0..4).filter(within).count()
     }
 
     /// The places in `slots` of those that have a heading, given in the chart of a corner at the same vertex, when

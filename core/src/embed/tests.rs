@@ -401,3 +401,37 @@ fn arcs_can_cross_folds() {
     let whole: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
     assert!((whole - 1.0).abs() < 1e-9);
 }
+
+#[test]
+fn isolines_leave_a_node_that_lies_in_a_fold() {
+    for k in [3, 4, 5, 6] {
+        for (i, far) in (0..8).flat_map(|i| [(i, 0.6), (i, 1.1), (i, 1.5)]) {
+            let mut s = samples::cone(k, 4, 0.1);
+            // A neighbour of the centre goes round it beyond the next, so that the triangle between turns over.
+            let ring: Vec<HalfedgeId> = s.mesh.outgoing(s.nodes[0]).collect();
+            let moved = s.mesh.target(ring[i % ring.len()]);
+            let at = |map: &SeamlessMap, h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
+            let corner = s.mesh.next(ring[i % ring.len()]);
+            let spoke = at(&s.map, corner) - at(&s.map, ring[i % ring.len()]);
+            let mut by = DVec2::from_angle(far).rotate(spoke) - spoke;
+            let around: Vec<HalfedgeId> = s.mesh.outgoing(moved).collect();
+            let begin = around.iter().position(|&h| h == corner).unwrap();
+            for j in 0..around.len() {
+                let h = around[(begin + j) % around.len()];
+                s.map.uv[h.index() / 3][h.index() % 3] += by;
+                let change = s.map.transition(&s.mesh, s.mesh.prev(h)).unwrap();
+                by = crate::param::turn(by, i32::from(change.turns));
+            }
+            let node = super::march::nodes_at(&s.mesh, &s.nodes);
+            let exact = super::march::exactness(&s.map);
+            let lines = super::march::Isolines { mesh: &s.mesh, map: &s.map, node: &node, exact, through_folds: true };
+            assert_eq!(lines.slots(s.nodes[0]).len(), k as usize, "{k} {i} {far}");
+            let traced = trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), Folds::Cross).unwrap();
+            let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
+            let folded = s.mesh.faces().any(|f| s.map.is_flipped(f));
+            assert_eq!(maps.iter().any(|m| m.flipped > 0), folded);
+            let whole: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
+            assert!((whole - area(&s.mesh)).abs() < 1e-9);
+        }
+    }
+}

@@ -42,6 +42,18 @@ impl Line {
         self.direction().dot(w - self.start)
     }
 
+    /// The line run the other way; where it starts is no end of it.
+    pub fn reversed(&self) -> Self {
+        Self { heading: (self.heading + 2) % 4, ..*self }
+    }
+
+    /// Where two lines cross, unless they run in the same direction or against each other.
+    pub fn meet(&self, other: &Self) -> Option<DVec2> {
+        let [along_u, along_v] = if self.heading.is_multiple_of(2) { [self, other] } else { [other, self] };
+        let crosses = (self.heading + other.heading) % 2 == 1;
+        crosses.then(|| DVec2::new(along_v.start.x, along_u.start.y))
+    }
+
     /// The line in another chart.
     pub fn seen(&self, change: &Transition) -> Self {
         Self { start: change.apply(self.start), heading: (self.heading + change.turns) % 4 }

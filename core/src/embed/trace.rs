@@ -159,7 +159,7 @@ pub fn trace_arcs(
         }
         if *backward {
             points.reverse();
-            points = points.iter().map(|p| p.reversed(mesh)).collect();
+            points = points.iter().map(|p| p.reversed(mesh, &exact)).collect();
         }
         arcs.push(points);
     }
@@ -224,7 +224,7 @@ pub(super) fn straighten(lines: &Isolines, map: &mut SeamlessMap, steps: &[Step]
 pub(super) fn points(lines: &Isolines, steps: &[Step]) -> Vec<Point> {
     let point = |s: &Step| match *s {
         Step::Vertex(corner, _) => Point::Vertex(lines.mesh.origin(corner)),
-        Step::Edge(h, line) => Point::Edge(h, lines.crossing(h, &line)),
+        Step::Edge(h, line) => Point::Edge(h, lines.crossing(h, &line), line),
     };
     steps.iter().map(point).collect()
 }
@@ -232,7 +232,7 @@ pub(super) fn points(lines: &Isolines, steps: &[Step]) -> Vec<Point> {
 /// The triangle of a crossing that is not inside its edge.
 pub(super) fn misplaced(mesh: &TriMesh, points: &[Point]) -> Option<FaceId> {
     points.iter().find_map(|p| match *p {
-        Point::Edge(h, t) => (!(t > 0.0 && t < 1.0)).then(|| mesh.face(h)),
+        Point::Edge(h, t, _) => (!(t > 0.0 && t < 1.0)).then(|| mesh.face(h)),
         Point::Vertex(_) => None,
     })
 }

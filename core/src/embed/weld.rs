@@ -405,11 +405,11 @@ fn quality(polygon: &[Corner], corners: [usize; 3]) -> f64 {
     (b - a).perp_dot(c - a) / longest
 }
 
-/// Where the chord `c` meets the chord `d`, as a fraction of `c` off its ends.
+/// Where the chord `c` meets the chord `d` in the map, as a fraction of `c` off its ends.
 fn meet(c: [Corner; 2], d: [Corner; 2]) -> f64 {
     // Distance from its ends below which a crossing is put off them: what is nearer is not told apart.
     const APART: f64 = 1e-6;
-    let ([a, b], [p, q]) = (c.map(|x| x.place), d.map(|x| x.place));
+    let ([a, b], [p, q]) = (c.map(|x| x.uv), d.map(|x| x.uv));
     let t = (p - a).perp_dot(q - p) / (b - a).perp_dot(q - p);
     if t.is_finite() { t.clamp(APART, 1.0 - APART) } else { 0.5 }
 }

@@ -113,7 +113,7 @@ fn separatrices(
                 Err(Stop::Length(_)) => return Err(EmergeError::Endless { node }),
                 Err(Stop::Fold(_) | Stop::Vertex(_)) => return Err(EmergeError::Fold { node }),
             };
-            straighten(mesh, &mut exact, inner);
+            straighten(&lines, &mut exact, inner);
             found.push(steps);
         }
     }

@@ -11,8 +11,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// How close to its end, as a fraction of the edge, a line crosses an edge before it goes through the vertex
-/// instead, and how large an angle with an edge, in radians, is none: what parts a triangle less evenly than this
-/// is no use to anyone, and the vertex moves in the map by less than folds it.
+/// instead: what parts a triangle less evenly than this is no use to anyone.
 const SNAP: f64 = 1e-4;
 /// Distance from a line, as a fraction of the whole map's size, that is rounding of the map itself.
 const EXACT: f64 = 1e-9;
@@ -41,6 +40,18 @@ impl Line {
     /// How far along the line a point is.
     pub fn along(&self, w: DVec2) -> f64 {
         self.direction().dot(w - self.start)
+    }
+
+    /// The line run the other way; where it starts is no end of it.
+    pub fn reversed(&self) -> Self {
+        Self { heading: (self.heading + 2) % 4, ..*self }
+    }
+
+    /// Where two lines cross, unless they run in the same direction or against each other.
+    pub fn meet(&self, other: &Self) -> Option<DVec2> {
+        let [along_u, along_v] = if self.heading.is_multiple_of(2) { [self, other] } else { [other, self] };
+        let crosses = (self.heading + other.heading) % 2 == 1;
+        crosses.then(|| DVec2::new(along_v.start.x, along_u.start.y))
     }
 
     /// The line in another chart.
@@ -170,7 +181,7 @@ impl Isolines<'_> {
     fn side(&self, edge: DVec2, heading: u8) -> Side {
         let d = direction(heading);
         let (off, length) = (d.perp_dot(edge), edge.length());
-        if off.abs() <= (SNAP * length).max(self.exact).min(WITHIN * length) {
+        if off.abs() <= self.exact.min(WITHIN * length) {
             if d.dot(edge) > 0.0 { Side::Ahead } else { Side::Behind }
         } else if off > 0.0 {
             Side::Left
@@ -203,7 +214,10 @@ impl Isolines<'_> {
     /// The isolines that leave a vertex, counter-clockwise. On the boundary the first and the last run along it,
     /// whatever the map says.
     pub fn slots(&self, v: VertexId) -> Vec<Slot> {
-        let mut slots = Vec::new();
+        let mut slots: Vec<Slot> = Vec::new();
+        // Going round, a heading that a fold passes back over and then again is one and the same: such a passage
+        // back takes the slot before it away, and one before all slots the last.
+        let mut before_all = 0;
         for corner in self.mesh.outgoing(v) {
             let all = (0..4).filter_map(|heading| Some(Slot { corner, heading, exit: self.exit(corner, heading)? }));
             let mut here: Vec<Slot> = all.collect();
@@ -211,7 +225,11 @@ impl Isolines<'_> {
             let begin = here.iter().position(|s| here.iter().all(|o| (o.heading + 1) % 4 != s.heading));
             here.rotate_left(begin.unwrap_or(0));
             slots.extend(here);
+            let back = if self.through_folds { self.passed_back(corner) } else { 0 };
+            before_all += back.saturating_sub(slots.len());
+            slots.truncate(slots.len().saturating_sub(back));
         }
+        slots.truncate(slots.len().saturating_sub(before_all));
         if self.mesh.is_boundary_vertex(v) {
             let first = self.mesh.vertex_halfedge(v);
             let last = self.mesh.outgoing(v).last().unwrap_or(first);
@@ -226,6 +244,16 @@ impl Isolines<'_> {
             slots.push(Slot { corner: last, heading: nearest(edge), exit: Exit::Back });
         }
         slots
+    }
+
+    /// The number of headings that a corner of a triangle that is turned over passes clockwise.
+    fn passed_back(&self, corner: HalfedgeId) -> usize {
+        let (w, a, b) = (self.uv(corner), self.uv(self.mesh.next(corner)), self.uv(self.mesh.prev(corner)));
+        if (a - w).perp_dot(b - w) >= 0.0 {
+            return 0;
+        }
+        let within = |k: &u8| direction(*k).perp_dot(a - w) > 0.0 && direction(*k).perp_dot(b - w) < 0.0;
+        (0..4).filter(within).count()
     }
 
     /// The places in `slots` of those that have a heading, given in the chart of a corner at the same vertex, when
@@ -304,9 +332,8 @@ impl Isolines<'_> {
                 At::Leaving(h) => {
                     let t = self.crossing(h, &line);
                     let (right, left) = (self.uv(h), self.uv(mesh.next(h)));
-                    let close = SNAP.max(self.exact / (line.off(left) - line.off(right)).abs()).min(WITHIN);
-                    if t <= close || t >= 1.0 - close {
-                        at = At::Vertex(if t <= close { h } else { mesh.next(h) });
+                    if let Some(end) = self.close(h, t, &line) {
+                        at = At::Vertex(end);
                         continue;
                     }
                     steps.push(Step::Edge(h, line));
@@ -332,6 +359,41 @@ impl Isolines<'_> {
     pub fn crossing(&self, h: HalfedgeId, line: &Line) -> f64 {
         let (right, left) = (line.off(self.uv(h)), line.off(self.uv(self.mesh.next(h))));
         -right / (left - right)
+    }
+
+    /// The corner of the triangle of `h`, at an end of `h`, that a line which crosses `h` at `t` goes through instead.
+    fn close(&self, h: HalfedgeId, t: f64, line: &Line) -> Option<HalfedgeId> {
+        let end = if t < 0.5 { h } else { self.mesh.next(h) };
+        let off = line.off(self.uv(end));
+        let rounding = self.exact / (line.off(self.uv(self.mesh.next(h))) - line.off(self.uv(h))).abs();
+        let away = t.min(1.0 - t);
+        let goes =
+            away <= rounding.min(WITHIN) || away <= SNAP && (away <= 0.0 || self.may_move(end, off, line.heading));
+        goes.then_some(end)
+    }
+
+    /// Whether the origin of a corner can be moved to a line that it is `off` without turning a triangle over.
+    fn may_move(&self, corner: HalfedgeId, off: f64, heading: u8) -> bool {
+        self.fan(corner, -off * direction((heading + 1) % 4)).into_iter().all(|(h, shift)| {
+            let (a, b, c) = (self.uv(h), self.uv(self.mesh.next(h)), self.uv(self.mesh.prev(h)));
+            (b - a).perp_dot(c - a) <= 0.0 || (b - a - shift).perp_dot(c - a - shift) > 0.0
+        })
+    }
+
+    /// All corners at the origin of `corner`, each with a vector that is given in its chart as `vector`.
+    pub fn fan(&self, corner: HalfedgeId, vector: DVec2) -> Vec<(HalfedgeId, DVec2)> {
+        let mut fan = vec![(corner, vector)];
+        for clockwise in [false, true] {
+            let (mut at, mut vector) = (corner, vector);
+            while let Some((next, change)) = if clockwise { self.cw(at) } else { self.ccw(at) } {
+                (at, vector) = (next, turn(vector, i32::from(change.turns)));
+                if at == corner {
+                    return fan;
+                }
+                fan.push((at, vector));
+            }
+        }
+        fan
     }
 
     fn leave(&self, corner: HalfedgeId, exit: Exit) -> At {

@@ -40,7 +40,7 @@ pub use net::{Headings, Net, NetArc, NetNode, headings};
 pub use patches::{RectangleError, map_rectangles};
 pub use relocate::Hold;
 pub use sizing::{SizingSystem, rest_turns};
-pub use trace::{ArcChain, TraceError, Traced, preview_arcs, trace_arcs};
+pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
 
 use thiserror::Error;
 

@@ -265,8 +265,8 @@ pub(crate) fn slanted_torus(n: u32, shake: f64) -> Sample {
     sample(mesh, map, layout, nodes, |a| middles[a].clone())
 }
 
-/// A cube of side 1 with `n` steps along an edge, its map slanted by a quarter-turn field of direction `along`, and
-/// `k` × `k` patches on each side if `along` is +x.
+/// A cube of side 1 with `n` steps along an edge; +u runs in the direction `along` on every side. Vertices that are
+/// neither corners nor half-way between them are moved by up to `shake` steps.
 pub(crate) fn cube_map(n: i32, shake: f64, along: DVec2) -> (TriMesh, SeamlessMap) {
     let plain = crate::field::samples::cells(&[[0, 0, 0]], n);
     let mut noise = Noise(17);

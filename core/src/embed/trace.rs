@@ -3,15 +3,15 @@
 //! Arcs become edge paths of a refined mesh. Vertices that they pass through move in the map, not on the surface,
 //! by what they were off, so that arcs are isolines exactly.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use thiserror::Error;
 
-use super::march::{Isolines, Step, exactness, nodes_at};
+use super::march::{Isolines, Step, direction, exactness, nodes_at};
 use super::rose::{LENGTH, Rose, Run};
 use super::weld::{Meeting, Point, weld};
 use crate::layout::{Embedding, QuadLayout};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
-use crate::param::{SeamlessMap, turn};
+use crate::param::SeamlessMap;
 
 /// How an arc runs: through which triangles, up to homotopy, and in which direction of the map.
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +120,16 @@ pub struct Traced {
     pub map: SeamlessMap,
 }
 
+/// What to do about triangles that the map turns over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Folds {
+    /// An arc that meets one is an error.
+    Refuse,
+    /// Arcs go through them. They are isolines all the same, which part the surface into the patches as they should
+    /// if only they do not meet one another in the fold; its triangles stay turned over in their patch.
+    Cross,
+}
+
 /// Traces the arcs of `layout` in `map`, whose nodes are the vertices `node_vertex` and whose arcs run like `chains`.
 ///
 /// # Errors
@@ -131,13 +141,14 @@ pub fn trace_arcs(
     layout: &QuadLayout,
     node_vertex: &[VertexId],
     chains: &[ArcChain],
+    folds: Folds,
 ) -> Result<Traced, TraceError> {
     let node = nodes_at(mesh, node_vertex);
-    let lines = Isolines { mesh, map, node: &node, exact: exactness(map), through_folds: false };
+    let lines = Isolines { mesh, map, node: &node, exact: exactness(map), through_folds: folds == Folds::Cross };
     let marched = Rose::new(&lines, layout, node_vertex, chains)?.arcs()?;
     let mut exact = map.clone();
     for (line, _) in &marched {
-        straighten(mesh, &mut exact, &line.steps[1..line.steps.len() - 1]);
+        straighten(&lines, &mut exact, &line.steps[1..line.steps.len() - 1]);
     }
     let lines = Isolines { map: &exact, ..lines };
     let mut arcs = Vec::with_capacity(marched.len());
@@ -148,7 +159,7 @@ pub fn trace_arcs(
         }
         if *backward {
             points.reverse();
-            points = points.iter().map(|p| p.reversed(mesh)).collect();
+            points = points.iter().map(|p| p.reversed(mesh, &exact)).collect();
         }
         arcs.push(points);
     }
@@ -200,30 +211,12 @@ pub fn preview_arcs(
 const CLOSE: f64 = 1e-3;
 
 /// Moves the vertices among the points of a line, which are no nodes, onto it in the map.
-pub(super) fn straighten(mesh: &TriMesh, map: &mut SeamlessMap, steps: &[Step]) {
+pub(super) fn straighten(lines: &Isolines, map: &mut SeamlessMap, steps: &[Step]) {
     for step in steps {
         let Step::Vertex(corner, line) = *step else { continue };
         let off = line.off(map.uv[corner.index() / 3][corner.index() % 3]);
-        let shift = -off * turn(DVec2::Y, i32::from(line.heading));
-        // All first, then moved: on the way around, changes of chart must be those of the map as it was.
-        let mut fan = Vec::new();
-        for clockwise in [false, true] {
-            let (mut at, mut moved) = (corner, shift);
-            loop {
-                if fan.iter().all(|&(h, _)| h != at) {
-                    fan.push((at, moved));
-                }
-                let over = if clockwise { at } else { mesh.prev(at) };
-                let (Some(g), Some(change)) = (mesh.twin(over), map.transition(mesh, over)) else { break };
-                at = if clockwise { mesh.next(g) } else { g };
-                moved = turn(moved, i32::from(change.turns));
-                if at == corner {
-                    break;
-                }
-            }
-        }
-        for (h, moved) in fan {
-            map.uv[h.index() / 3][h.index() % 3] += moved;
+        for (h, shift) in lines.fan(corner, -off * direction((line.heading + 1) % 4)) {
+            map.uv[h.index() / 3][h.index() % 3] += shift;
         }
     }
 }
@@ -231,7 +224,7 @@ pub(super) fn straighten(mesh: &TriMesh, map: &mut SeamlessMap, steps: &[Step]) 
 pub(super) fn points(lines: &Isolines, steps: &[Step]) -> Vec<Point> {
     let point = |s: &Step| match *s {
         Step::Vertex(corner, _) => Point::Vertex(lines.mesh.origin(corner)),
-        Step::Edge(h, line) => Point::Edge(h, lines.crossing(h, &line)),
+        Step::Edge(h, line) => Point::Edge(h, lines.crossing(h, &line), line),
     };
     steps.iter().map(point).collect()
 }
@@ -239,7 +232,7 @@ pub(super) fn points(lines: &Isolines, steps: &[Step]) -> Vec<Point> {
 /// The triangle of a crossing that is not inside its edge.
 pub(super) fn misplaced(mesh: &TriMesh, points: &[Point]) -> Option<FaceId> {
     points.iter().find_map(|p| match *p {
-        Point::Edge(h, t) => (!(t > 0.0 && t < 1.0)).then(|| mesh.face(h)),
+        Point::Edge(h, t, _) => (!(t > 0.0 && t < 1.0)).then(|| mesh.face(h)),
         Point::Vertex(_) => None,
     })
 }

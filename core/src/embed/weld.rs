@@ -7,18 +7,23 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
+use super::march::Line;
 use super::trace::TraceError;
 use crate::dual::{Mark, RefinedMesh};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::param::SeamlessMap;
+use crate::param::{SeamlessMap, turn};
+
+/// How close to each other, as a fraction of the edge, two arcs that cross may cross an edge before they meet on it:
+/// what parts a triangle less evenly than this is no use to anyone.
+const TOGETHER: f64 = 1e-4;
 
 /// A point of an arc.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Point {
     /// A vertex of the mesh.
     Vertex(VertexId),
-    /// The crossing of a half-edge of the triangle that is left, as a fraction of its way.
-    Edge(HalfedgeId, f64),
+    /// The crossing of a half-edge of the triangle that is left, as a fraction of its way, and the line in that triangle.
+    Edge(HalfedgeId, f64, Line),
 }
 
 impl Point {
@@ -26,16 +31,15 @@ impl Point {
     pub fn position(&self, mesh: &TriMesh) -> DVec3 {
         match *self {
             Self::Vertex(v) => mesh.position(v),
-            Self::Edge(h, t) => mesh.position(mesh.origin(h)) + mesh.vector(h) * t,
+            Self::Edge(h, t, _) => mesh.position(mesh.origin(h)) + mesh.vector(h) * t,
         }
     }
 
     /// The same point of an arc that runs the other way.
-    pub fn reversed(&self, mesh: &TriMesh) -> Self {
-        match *self {
-            Self::Edge(h, t) => mesh.twin(h).map_or(*self, |g| Self::Edge(g, 1.0 - t)),
-            Self::Vertex(_) => *self,
-        }
+    pub fn reversed(&self, mesh: &TriMesh, map: &SeamlessMap) -> Self {
+        let Self::Edge(h, t, line) = *self else { return *self };
+        let (Some(g), Some(change)) = (mesh.twin(h), map.transition(mesh, h)) else { return *self };
+        Self::Edge(g, 1.0 - t, line.seen(&change).reversed())
     }
 }
 
@@ -67,11 +71,9 @@ pub(super) fn weld(
     meeting: Meeting,
 ) -> Result<Welded, TraceError> {
     let mut sheet = Sheet::new(mesh);
+    sheet.mark_edges(mesh, map, arcs, meeting);
     for (arc, points) in (0u32..).zip(arcs) {
         sheet.lay(mesh, arc, points, meeting)?;
-    }
-    for points in &mut sheet.on_edge {
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
     let mut out = Pieces { positions: std::mem::take(&mut sheet.positions), ..Pieces::default() };
     for f in mesh.faces() {
@@ -109,13 +111,24 @@ struct Chord {
     piece: u32,
 }
 
+/// A point on an edge where arcs cross it.
+#[derive(Debug, Clone, Copy)]
+struct Mile {
+    /// Fraction along [`TriMesh::halfedge`].
+    t: f64,
+    vertex: u32,
+    arc: u32,
+    /// By how much its place in the map is off the edge, in the chart of the triangle of that half-edge.
+    shift: DVec2,
+}
+
 /// The points on all edges and the chords in all triangles.
 struct Sheet {
     positions: Vec<DVec3>,
-    /// Points on each edge: fraction along [`TriMesh::halfedge`], vertex and arc; in this order after sorting.
-    on_edge: Vec<Vec<(f64, u32, u32)>>,
+    /// Points on each edge, in order.
+    on_edge: Vec<Vec<Mile>>,
     chords: Vec<Vec<Chord>>,
-    /// Arc through each vertex of the mesh or along each edge, or `u32::MAX`.
+    /// Arc through each vertex of the mesh, or `u32::MAX`.
     through: Vec<u32>,
     /// Vertex of each point of each arc.
     vertices: Vec<Vec<u32>>,
@@ -132,39 +145,72 @@ impl Sheet {
         }
     }
 
-    /// Notes the points and chords of an arc.
+    /// Makes the vertices of all points of arcs.
+    fn mark_edges(&mut self, mesh: &TriMesh, map: &SeamlessMap, arcs: &[Vec<Point>], meeting: Meeting) {
+        let mut raw: Vec<Vec<(f64, usize, usize, Line)>> = vec![Vec::new(); mesh.n_edges()];
+        for (arc, points) in arcs.iter().enumerate() {
+            self.vertices.push(points.iter().map(|p| if let Point::Vertex(v) = p { v.0 } else { u32::MAX }).collect());
+            for (i, point) in points.iter().enumerate() {
+                let Point::Edge(h, t, line) = *point else { continue };
+                let e = mesh.edge(h);
+                raw[e.index()].push(match map.transition(mesh, h) {
+                    Some(change) if mesh.halfedge(e) != h => (1.0 - t, arc, i, line.seen(&change)),
+                    _ => (t, arc, i, line),
+                });
+            }
+        }
+        for (e, mut raw) in mesh.edges().zip(raw) {
+            raw.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut k = 0;
+            while k < raw.len() {
+                let (t, arc, i, line) = raw[k];
+                let mut mile = Mile { t, vertex: self.positions.len() as u32, arc: arc as u32, shift: DVec2::ZERO };
+                self.vertices[arc][i] = mile.vertex;
+                k += 1;
+                if let Some(&(other_t, other_arc, other_i, other)) = raw.get(k)
+                    && meeting == Meeting::Vertex
+                    && other_t - t < TOGETHER
+                    && let Some(place) = line.meet(&other)
+                {
+                    k += 1;
+                    self.vertices[other_arc][other_i] = mile.vertex;
+                    mile.t = 0.5 * (t + other_t);
+                    let h = mesh.halfedge(e);
+                    let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
+                    mile.shift = place - uv(h).lerp(uv(mesh.next(h)), mile.t);
+                }
+                let [a, b] = mesh.edge_vertices(e).map(|v| mesh.position(v));
+                self.positions.push(a.lerp(b, mile.t));
+                self.on_edge[e.index()].push(mile);
+            }
+        }
+    }
+
+    /// Notes the chords of an arc.
     fn lay(&mut self, mesh: &TriMesh, arc: u32, points: &[Point], meeting: Meeting) -> Result<(), TraceError> {
-        let mut path: Vec<u32> = Vec::with_capacity(points.len());
         for (i, point) in points.iter().enumerate() {
-            let vertex = match *point {
-                Point::Vertex(v) => {
-                    let inside = i > 0 && i + 1 < points.len();
-                    let other = std::mem::replace(&mut self.through[v.index()], if inside { arc } else { u32::MAX });
-                    if inside && other != u32::MAX && meeting == Meeting::Wrong {
-                        let face = mesh.face(mesh.vertex_halfedge(v));
-                        return Err(TraceError::Crossing { arcs: [other, arc], face });
-                    }
-                    v.0
+            if let Point::Vertex(v) = *point
+                && i > 0
+                && i + 1 < points.len()
+            {
+                let other = std::mem::replace(&mut self.through[v.index()], arc);
+                if other != u32::MAX && meeting == Meeting::Wrong {
+                    let face = mesh.face(mesh.vertex_halfedge(v));
+                    return Err(TraceError::Crossing { arcs: [other, arc], face });
                 }
-                Point::Edge(h, t) => {
-                    let (e, new) = (mesh.edge(h), self.positions.len() as u32);
-                    self.positions.push(point.position(mesh));
-                    self.on_edge[e.index()].push((if mesh.halfedge(e) == h { t } else { 1.0 - t }, new, arc));
-                    new
-                }
-            };
+            }
             // Between two vertices an arc runs along an edge.
             let face = match (i.checked_sub(1).map(|j| points[j]), *point) {
-                (Some(Point::Edge(h, _)), _) => mesh.twin(h).map(|g| mesh.face(g)),
-                (Some(Point::Vertex(_)), Point::Edge(h, _)) => Some(mesh.face(h)),
+                (Some(Point::Edge(h, ..)), _) => mesh.twin(h).map(|g| mesh.face(g)),
+                (Some(Point::Vertex(_)), Point::Edge(h, ..)) => Some(mesh.face(h)),
                 _ => None,
             };
-            if let (Some(f), Some(&before)) = (face, path.last()) {
-                self.chords[f.index()].push(Chord { ends: [before, vertex], arc, piece: i as u32 });
+            if let Some(f) = face {
+                let vertices = &self.vertices[arc as usize];
+                let ends = [vertices[i - 1], vertices[i]];
+                self.chords[f.index()].push(Chord { ends, arc, piece: i as u32 });
             }
-            path.push(vertex);
         }
-        self.vertices.push(path);
         Ok(())
     }
 
@@ -186,9 +232,9 @@ impl Sheet {
                 if let Some(h) = around(a, b).or_else(|| around(b, a)) {
                     let across = &self.on_edge[mesh.edge(h).index()];
                     if let Some(p) = across.first().filter(|_| meeting == Meeting::Wrong) {
-                        return Err(TraceError::Crossing { arcs: [p.2, arc], face: mesh.face(h) });
+                        return Err(TraceError::Crossing { arcs: [p.arc, arc], face: mesh.face(h) });
                     }
-                    met.extend(across.iter().map(|p| p.1));
+                    met.extend(across.iter().map(|p| p.vertex));
                 }
             }
             let away = |v: &u32| pieces.positions[*v as usize].distance_squared(start);
@@ -337,9 +383,12 @@ fn border(sheet: &Sheet, positions: &[DVec3], mesh: &TriMesh, map: &SeamlessMap,
         let e = mesh.edge(h);
         let points = &sheet.on_edge[e.index()];
         let forward = mesh.halfedge(e) == h;
+        let turned = if forward { 0 } else { map.transition(mesh, h).map_or(0, |c| 4 - c.turns) };
         corners.extend((0..points.len()).map(|k| {
-            let (s, vertex, _) = if forward { points[k] } else { points[points.len() - 1 - k] };
-            Corner::between(&ends[i], &ends[(i + 1) % 3], if forward { s } else { 1.0 - s }, vertex, 1 << i)
+            let mile = points[if forward { k } else { points.len() - 1 - k }];
+            let t = if forward { mile.t } else { 1.0 - mile.t };
+            let corner = Corner::between(&ends[i], &ends[(i + 1) % 3], t, mile.vertex, 1 << i);
+            Corner { uv: corner.uv + turn(mile.shift, i32::from(turned)), ..corner }
         }));
     }
     corners
@@ -356,11 +405,11 @@ fn quality(polygon: &[Corner], corners: [usize; 3]) -> f64 {
     (b - a).perp_dot(c - a) / longest
 }
 
-/// Where the chord `c` meets the chord `d`, as a fraction of `c` off its ends.
+/// Where the chord `c` meets the chord `d` in the map, as a fraction of `c` off its ends.
 fn meet(c: [Corner; 2], d: [Corner; 2]) -> f64 {
     // Distance from its ends below which a crossing is put off them: what is nearer is not told apart.
     const APART: f64 = 1e-6;
-    let ([a, b], [p, q]) = (c.map(|x| x.place), d.map(|x| x.place));
+    let ([a, b], [p, q]) = (c.map(|x| x.uv), d.map(|x| x.uv));
     let t = (p - a).perp_dot(q - p) / (b - a).perp_dot(q - p);
     if t.is_finite() { t.clamp(APART, 1.0 - APART) } else { 0.5 }
 }

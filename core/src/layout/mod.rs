@@ -1,14 +1,19 @@
 //! Quad layouts: their structure, read off an arrangement of dual curves, and a first embedding.
 //!
 //! Data flows [`structure`] → [`embed`] (nodes and arcs on the surface) → [`patch`] (each patch mapped to a
-//! rectangle). The room knows arrangements, not how their curves came about.
+//! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. The room knows arrangements, not how their curves came about.
 
 mod disc;
 mod embed;
+mod file;
 mod patch;
 mod piece;
 mod structure;
 
 pub use embed::{EmbedError, Embedding, embed};
+pub use file::{
+    ArcEnd, DrawError, Drawing, DrawnCorner, DrawnRegion, FileArc, FileNode, LayoutFile, LayoutFileError, Part,
+    PathPoint,
+};
 pub use patch::{PatchError, PatchMap, map_patches};
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};

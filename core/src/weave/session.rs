@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::design::{Design, DesignError, MeshSource, Strip, StripId};
+use super::design::{Design, DesignError, Strip, StripId};
 use super::model::{Model, Options};
 use super::suggest::Stuck;
 use super::woven::Woven;
@@ -13,7 +13,7 @@ use crate::dual::{Arrangement, ArrangementError};
 use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
 use crate::field::FieldError;
 use crate::layout::{EmbedError, LayoutError, PatchError};
-use crate::mesh::{LoadedMesh, TriMesh};
+use crate::mesh::{LoadedMesh, MeshSource, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use proptest::prelude::*;
@@ -418,13 +419,87 @@ fn files_that_cannot_be_read_say_why() {
     file.check_mesh(&mesh).unwrap();
 }
 
+/// A square woven from side to side.
+fn square_grid() -> (TriMesh, LayoutFile) {
+    let mesh = square(8);
+    let curves: Vec<SurfaceCurve> =
+        (0..3).flat_map(|k| [row(8, 2 * k, false, 0.5), column(8, 8, 1 + 2 * k, false, 0.5)]).collect();
+    let (layout, embedding) = woven(&mesh, &curves);
+    let file = LayoutFile::from_embedding(source(), &mesh, &layout, &embedding).unwrap();
+    (mesh, file)
+}
+
+#[test]
+fn patches_much_smaller_than_triangles_survive_writing_and_reading() {
+    for (n, m, count) in [(3, 3, 4), (4, 4, 7), (6, 4, 9)] {
+        let mesh = torus(n, m);
+        let fraction = |i: u32| (f64::from(i) + 0.5 + 0.4 * f64::from(3 * i).sin()) / f64::from(count);
+        let curves: Vec<SurfaceCurve> = (0..count)
+            .flat_map(|i| [row(n, (i / 4) % m, true, fraction(i)), column(n, m, (i / 3) % n, true, 1.0 - fraction(i))])
+            .collect();
+        let (layout, embedding) = woven(&mesh, &curves);
+        let file = LayoutFile::from_embedding(source(), &mesh, &layout, &embedding).unwrap();
+        let drawing = file.draw(&mesh).unwrap();
+        check(&drawing);
+        assert_eq!(patches(&drawing.to_embedding().unwrap().unwrap().0), patches(&layout));
+    }
+}
+
+#[test]
+fn arcs_at_the_boundary_have_slots_that_say_so() {
+    let (mesh, whole) = square_grid();
+    let error = |change: &dyn Fn(&mut LayoutFile)| {
+        let mut file = whole.clone();
+        change(&mut file);
+        file.draw(&mesh).unwrap_err()
+    };
+    let at_corner =
+        |f: &LayoutFile, v: u32| f.nodes.iter().position(|n| n.at == at_vertex(&mesh, VertexId(v))).unwrap();
+    let corners = [0, 8, 80].map(|v| at_corner(&whole, v) as u32);
+    let end = |node: u32, slot: u32| ArcEnd { node, slot };
+    let only = |f: &mut LayoutFile, ends: [ArcEnd; 2], path: &[u32]| {
+        let path = path.iter().map(|&v| PathPoint::Vertex { vertex: VertexId(v) }).collect();
+        f.arcs = vec![FileArc { ends, fixed: false, path }];
+    };
+    // To the next corner but across other nodes.
+    let across = error(&|f| only(f, [end(corners[0], 0), end(corners[1], 1)], &[]));
+    assert_eq!(across, DrawError::OffBoundary { arc: 0 });
+    // With the slots of a boundary arc, but through the interior.
+    let inside = error(&|f| only(f, [end(corners[0], 0), end(corners[2], 1)], &[10, 20, 30, 40, 50, 60, 70]));
+    assert_eq!(inside, DrawError::OffBoundary { arc: 0 });
+    // Along the boundary with other slots.
+    let along = error(&|f| {
+        f.nodes.retain(|n| n.at == at_vertex(&mesh, VertexId(0)) || n.at == at_vertex(&mesh, VertexId(8)));
+        f.nodes.iter_mut().for_each(|n| n.valence = 2);
+        only(f, [end(0, 1), end(1, 1)], &[1, 2, 3, 4, 5, 6, 7]);
+    });
+    assert_eq!(along, DrawError::OnBoundary { arc: 0 });
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_layout() {
+    let text = include_str!("../../../../docs/layout-file.md");
+    let json = text.split("```json").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let file: LayoutFile = serde_json::from_str(json).unwrap();
+    let p = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    let mesh = TriMesh::from_faces(p.to_vec(), &[[0, 1, 2], [0, 2, 3]]).unwrap();
+    let drawing = file.draw(&mesh).unwrap();
+    check(&drawing);
+    let (layout, embedding) = drawing.to_embedding().unwrap().unwrap();
+    assert_eq!((layout.nodes.len(), layout.patches.len(), layout.chords), (6, 2, 3));
+    round_trip(&mesh, &layout, &embedding);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_arcs_are_dropped_is_drawn_or_refused(dropped in prop::collection::vec(0.0..1.0f64, 18), share in 0.0..0.6f64) {
-        static GRID: std::sync::OnceLock<(TriMesh, LayoutFile)> = std::sync::OnceLock::new();
-        let (mesh, whole) = GRID.get_or_init(torus_grid);
+    fn whatever_arcs_are_dropped_is_drawn_or_refused(
+        dropped in prop::collection::vec(0.0..1.0f64, 24), share in 0.0..0.6f64, which in 0..3usize
+    ) {
+        static LAYOUTS: OnceLock<[(TriMesh, LayoutFile); 3]> = OnceLock::new();
+        let cube = || (cube(4), cube_file(&cube(4), 4));
+        let (mesh, whole) = &LAYOUTS.get_or_init(|| [torus_grid(), square_grid(), cube()])[which];
         let mut file = whole.clone();
         let mut keep = dropped.iter().map(|x| *x >= share);
         file.arcs.retain(|_| keep.next().unwrap());

@@ -7,6 +7,7 @@
 
 mod convert;
 mod draw;
+mod place;
 mod regions;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@
 
 pub mod dual;
 pub mod elastica;
+pub mod embed;
 pub mod field;
 pub mod layout;
 pub mod mesh;

@@ -4,6 +4,7 @@
 
 mod cross;
 mod curves;
+mod guided;
 mod jumps;
 mod metric;
 #[cfg(test)]
@@ -18,6 +19,7 @@ use thiserror::Error;
 
 pub use cross::{CrossField, interpolate};
 pub use curves::{EdgePath, Step, trace_curves};
+pub use guided::{Guide, GuidedField, GuidedSystem, RELIABLE, cross_field, indices, turning_number};
 pub use metric::Metric;
 pub use shape::{Guides, shape_field};
 pub use singular::{Singularity, pronounced};

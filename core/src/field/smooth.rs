@@ -12,7 +12,7 @@
 
 use super::metric::Metric;
 use super::{FieldError, expect_length};
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::{SparseHermitian, SpdFactor, SpdSymbolic, c64};
 
@@ -117,8 +117,7 @@ fn assemble(
         let h = mesh.halfedge(e);
         let Some(t) = mesh.twin(h) else { continue };
         let (f, g) = (mesh.face(h), mesh.face(t));
-        let length = metric.length(h);
-        let weight = (1.5 * length * length / (metric.area(f) + metric.area(g))).clamp(WEIGHT[0], WEIGHT[1]);
+        let weight = edge_weight(metric, h, t);
         let coupling = c64::from_polar(weight, 4.0 * metric.transport(h, t));
         let (i, j) = (index[f.index()], index[g.index()]);
         for k in [i, j].into_iter().filter(|&k| k != u32::MAX) {
@@ -132,6 +131,13 @@ fn assemble(
         }
     }
     (SparseHermitian::from_triplets(free.len(), &triplets), rhs)
+}
+
+/// The weight of the edge of `h` and its twin: length over distance of the centres, within bounds.
+pub(super) fn edge_weight(metric: &Metric, h: HalfedgeId, twin: HalfedgeId) -> f64 {
+    let length = metric.length(h);
+    let areas = metric.area(FaceId(h.0 / 3)) + metric.area(FaceId(twin.0 / 3));
+    (1.5 * length * length / areas).clamp(WEIGHT[0], WEIGHT[1])
 }
 
 /// For each triangle, whether its component has a fixed or a pulled triangle.

@@ -75,8 +75,11 @@ pub struct Embedding {
     pub nodes: Vec<u32>,
     /// Vertices of each arc, from its first node to its second.
     pub arcs: Vec<Vec<u32>>,
-    /// A vertex inside each patch or on no arc at least: its crossing.
-    pub crossings: Vec<u32>,
+    /// A parameter that grows along each arc, at each of its vertices, from zero on: lines that part all arcs of a
+    /// chord at equal fractions of it go on from patch to patch.
+    pub arc_parameters: Vec<Vec<f64>>,
+    /// A face inside each patch.
+    pub seeds: Vec<u32>,
 }
 
 /// Embeds `layout`, the dual of `arrangement`. `preferred` names, per region, a vertex of the original mesh
@@ -212,7 +215,7 @@ fn boundary_halves(border: &[crate::dual::Side], stretch: &[u32], k: usize, node
 fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveError> {
     let mut fixed = vec![None; disc.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
-        let along = lengths(disc, side);
+        let along = lengths(disc.positions(), side);
         let total = along[along.len() - 1].max(f64::MIN_POSITIVE);
         for (&v, s) in side.iter().zip(along).take(side.len() - 1) {
             let turn = (k as f64 + s / total) / sides.len() as f64;
@@ -222,11 +225,11 @@ fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveErro
     disc::relaxed(disc, &fixed)
 }
 
-/// Length along a vertex path up to each of its vertices.
-pub(super) fn lengths(mesh: &TriMesh, path: &[u32]) -> Vec<f64> {
+/// Length along a vertex path up to each of its vertices; each step counts, however short.
+pub(super) fn lengths(positions: &[DVec3], path: &[u32]) -> Vec<f64> {
     let mut along = vec![0.0];
     for w in path.windows(2) {
-        let step = mesh.position(VertexId(w[0])).distance(mesh.position(VertexId(w[1])));
+        let step = positions[w[0] as usize].distance(positions[w[1] as usize]);
         along.push(along[along.len() - 1] + step.max(1e-9));
     }
     along
@@ -266,7 +269,7 @@ fn boundary_node(disc: &TriMesh, stretch: &[u32]) -> u32 {
         let angle: f64 = disc.outgoing(VertexId(v)).map(|h| disc.corner_angle(h)).sum();
         (std::f64::consts::PI - angle).abs()
     };
-    let along = lengths(disc, stretch);
+    let along = lengths(disc.positions(), stretch);
     let half = 0.5 * along[along.len() - 1];
     let inner = 1..stretch.len() - 1;
     let sharpest = inner.clone().max_by(|&i, &j| turn(stretch[i]).total_cmp(&turn(stretch[j])));
@@ -315,6 +318,7 @@ fn assemble(arrangement: &Arrangement, layout: &QuadLayout, parts: &[RegionPart]
         }
         arcs.push(path);
     }
-    let crossings = arrangement.crossings.iter().map(|c| c.vertex).collect();
-    Ok(Embedding { mesh, base_face, nodes, arcs, crossings })
+    let seeds = arrangement.crossings.iter().map(|c| mesh.any_outgoing(c.vertex) / 3).collect();
+    let arc_parameters = arcs.iter().map(|path| lengths(&mesh.positions, path)).collect();
+    Ok(Embedding { mesh, base_face, nodes, arcs, arc_parameters, seeds })
 }

@@ -99,14 +99,14 @@ pub fn map_patches(
 }
 
 /// Where arcs and nodes are.
-struct Lookup {
+pub(crate) struct Lookup {
     /// Arc of each directed edge on an arc, and whether it runs forward.
     arc: HashMap<(u32, u32), (u32, bool)>,
     is_node: Vec<bool>,
 }
 
 impl Lookup {
-    fn new(embedding: &Embedding) -> Self {
+    pub(crate) fn new(embedding: &Embedding) -> Self {
         let mut arc = HashMap::new();
         for (a, path) in embedding.arcs.iter().enumerate() {
             for w in path.windows(2) {
@@ -130,7 +130,7 @@ fn map_patch(
     size: DVec2,
 ) -> Result<PatchMap, PatchError> {
     let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
-    let faces = flood(&embedding.mesh, embedding.crossings[p], on_arc);
+    let faces = flood(&embedding.mesh, embedding.seeds[p], on_arc);
     let piece =
         Piece::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| PatchError::NoDisc { patch: p, source })?;
     let sides = border_sides(layout, lookup, &piece, p).ok_or(PatchError::Sides { patch: p })?;
@@ -151,9 +151,8 @@ fn map_patch(
     Ok(PatchMap { mesh, whole: piece.whole, base_face, uv, size, flipped })
 }
 
-/// The faces reached from the crossing without passing an arc, in increasing order.
-fn flood(mesh: &RefinedMesh, crossing: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
-    let seed = mesh.outgoing(crossing)[0] / 3;
+/// The faces reached from `seed` without passing an arc, in increasing order.
+pub(crate) fn flood(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
     let mut seen = std::collections::HashSet::from([seed]);
     let mut faces = vec![seed];
     let mut i = 0;
@@ -172,7 +171,7 @@ fn flood(mesh: &RefinedMesh, crossing: u32, on_arc: impl Fn(u32) -> bool) -> Vec
 }
 
 /// The vertices of the four sides, in the order of the layout's patch, each from corner to corner.
-fn border_sides(layout: &QuadLayout, lookup: &Lookup, piece: &Piece, p: usize) -> Option<[Vec<u32>; 4]> {
+pub(crate) fn border_sides(layout: &QuadLayout, lookup: &Lookup, piece: &Piece, p: usize) -> Option<[Vec<u32>; 4]> {
     let mesh = &piece.mesh;
     let start = mesh.halfedges().find(|&h| mesh.twin(h).is_none())?;
     let mut cycle = vec![start];
@@ -228,7 +227,7 @@ fn rectangle_border(mesh: &TriMesh, sides: &[Vec<u32>; 4], size: DVec2) -> Vec<O
     let corner = [DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
     let mut fixed = vec![None; mesh.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
-        let along = lengths(mesh, side);
+        let along = lengths(mesh.positions(), side);
         let total = along[along.len() - 1];
         for (&v, s) in side.iter().zip(along).take(side.len() - 1) {
             fixed[v as usize] = Some(corner[k].lerp(corner[(k + 1) % 4], s / total));

@@ -157,7 +157,7 @@ impl QuadLayout {
     }
 
     /// Numbers the classes of opposite arcs.
-    fn find_chords(&mut self) {
+    pub(crate) fn find_chords(&mut self) {
         let mut sets = UnionFind::new(self.arcs.len());
         for p in &self.patches {
             for i in 0..2 {

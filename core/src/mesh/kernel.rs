@@ -335,6 +335,17 @@ impl TriMesh {
         self.twin(self.vertex_halfedge(v)).is_none()
     }
 
+    /// The boundary half-edge that leads to a boundary vertex; any incoming one elsewhere.
+    pub fn incoming_boundary(&self, v: VertexId) -> HalfedgeId {
+        let last = self.outgoing(v).last();
+        self.prev(last.unwrap_or(self.vertex_halfedge(v)))
+    }
+
+    /// Moves a vertex; the connection of the mesh does not change.
+    pub(crate) fn set_position(&mut self, v: VertexId, position: DVec3) {
+        self.positions[v.index()] = position;
+    }
+
     /// The vector along a half-edge.
     #[inline]
     pub fn vector(&self, h: HalfedgeId) -> DVec3 {

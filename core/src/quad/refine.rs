@@ -57,10 +57,10 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
         arcs: Vec::with_capacity(layout.arcs.len()),
     };
     let mut first_on_arc = Vec::with_capacity(layout.arcs.len());
-    for (arc, path) in layout.arcs.iter().zip(&embedding.arcs) {
+    for ((arc, path), along) in layout.arcs.iter().zip(&embedding.arcs).zip(&embedding.arc_parameters) {
         first_on_arc.push(out.positions.len() as u32);
         let n = counts[arc.chord as usize];
-        for (at, v) in along_path(path, n, position) {
+        for (at, v) in along_path(path, along, n, position) {
             out.positions.push(at);
             out.base_face.push(face_at(v));
             out.boundary.push(arc.boundary);
@@ -90,12 +90,9 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
     out
 }
 
-/// The `n − 1` points that part a vertex path into `n` pieces of equal length, each with a vertex near it.
-fn along_path(path: &[u32], n: u32, position: impl Fn(u32) -> DVec3) -> Vec<(DVec3, u32)> {
-    let mut along = vec![0.0];
-    for w in path.windows(2) {
-        along.push(along[along.len() - 1] + position(w[0]).distance(position(w[1])).max(1e-9));
-    }
+/// The `n − 1` points that part a vertex path into `n` pieces of equal share in the parameter given `along` it, each
+/// with a vertex near it.
+fn along_path(path: &[u32], along: &[f64], n: u32, position: impl Fn(u32) -> DVec3) -> Vec<(DVec3, u32)> {
     let total = along[along.len() - 1];
     let mut k = 0;
     (1..n)

@@ -67,6 +67,35 @@ impl Reduction {
         (&self.terms[self.start[x] as usize..self.start[x + 1] as usize], self.constant[x])
     }
 
+    /// Number of variables.
+    pub fn n_variables(&self) -> usize {
+        self.constant.len()
+    }
+
+    /// The same variables in terms of the free ones of `next`, whose variables are the free ones here.
+    pub fn then(&self, next: &Self) -> Self {
+        let n = self.constant.len();
+        let mut out = Self {
+            n_free: next.n_free,
+            start: vec![0],
+            terms: Vec::with_capacity(2 * n),
+            constant: Vec::with_capacity(n),
+        };
+        for x in 0..n {
+            let (terms, mut constant) = self.expression(x);
+            let mut all = Vec::with_capacity(terms.len());
+            for &(z, a) in terms {
+                let (inner, d) = next.expression(z as usize);
+                all.extend(inner.iter().map(|&(y, b)| (y, a * b)));
+                constant += a * d;
+            }
+            out.terms.extend(collect(all));
+            out.start.push(out.terms.len() as u32);
+            out.constant.push(constant);
+        }
+        out
+    }
+
     /// The values of all variables where the free ones are `y`.
     pub fn expand(&self, y: &[f64]) -> Vec<f64> {
         (0..self.constant.len())

@@ -94,38 +94,66 @@ impl<T: Scalar> SparseHermitian<T> {
     /// Sums `triplets` (row, column, value) into an `n` by `n` matrix. An entry above the diagonal is mirrored, so
     /// each pair of off-diagonal entries is to be given once. The order of summation is that of the triplets.
     pub fn from_triplets(n: usize, triplets: &[(u32, u32, T)]) -> Self {
+        let (mut matrix, slot) = Self::zero(n, triplets.len(), || triplets.iter().map(|&(r, c, _)| (r, c)));
+        for (&(r, c, v), k) in triplets.iter().zip(slot) {
+            matrix.value[k as usize] += if r >= c { v } else { v.conjugate() };
+        }
+        matrix
+    }
+
+    /// The `n` by `n` matrix that is zero but has room for `count` entries (row, column), and where in
+    /// [`Self::values_mut`] each of them is. An entry above the diagonal has the place of its mirror image.
+    pub fn zero<I>(n: usize, count: usize, entries: impl Fn() -> I) -> (Self, Vec<u32>)
+    where
+        I: Iterator<Item = (u32, u32)>,
+    {
         let mut start = vec![0u32; n + 1];
-        for &(r, c, _) in triplets {
+        for (r, c) in entries() {
             start[r.min(c) as usize + 1] += 1;
         }
         for c in 0..n {
             start[c + 1] += start[c];
         }
         let mut fill = start.clone();
-        let mut sorted = vec![(0u32, T::ZERO); triplets.len()];
-        for &(r, c, v) in triplets {
-            let (r, c, v) = if r >= c { (r, c, v) } else { (c, r, v.conjugate()) };
-            sorted[fill[c as usize] as usize] = (r, v);
-            fill[c as usize] += 1;
+        // Row and number of each entry, column by column.
+        let mut sorted = vec![(0u32, 0u32); count];
+        for (k, (r, c)) in (0u32..).zip(entries()) {
+            let next = &mut fill[r.min(c) as usize];
+            sorted[*next as usize] = (r.max(c), k);
+            *next += 1;
         }
-        let mut matrix =
-            Self { col_start: vec![0], row: Vec::with_capacity(sorted.len()), value: Vec::with_capacity(sorted.len()) };
+        let mut matrix = Self { col_start: vec![0], row: Vec::with_capacity(count / 2), value: Vec::new() };
+        let mut slot = vec![0; count];
         for c in 0..n {
             let column = &mut sorted[start[c] as usize..start[c + 1] as usize];
-            column.sort_by_key(|e| e.0);
+            column.sort_unstable();
             let first = matrix.row.len();
-            for &(r, v) in column.iter() {
-                if matrix.row.len() > first && matrix.row.last() == Some(&r) {
-                    let last = matrix.value.len() - 1;
-                    matrix.value[last] += v;
-                } else {
+            for &(r, k) in column.iter() {
+                if matrix.row.len() == first || matrix.row.last() != Some(&r) {
                     matrix.row.push(r);
-                    matrix.value.push(v);
                 }
+                slot[k as usize] = matrix.row.len() as u32 - 1;
             }
             matrix.col_start.push(matrix.row.len() as u32);
         }
-        matrix
+        matrix.value = vec![T::ZERO; matrix.row.len()];
+        (matrix, slot)
+    }
+
+    /// Row, column and value of the stored entries, in the order of [`Self::values_mut`].
+    pub fn entries(&self) -> impl Iterator<Item = (u32, u32, T)> {
+        let column = |c: usize| self.col_start[c] as usize..self.col_start[c + 1] as usize;
+        (0..self.n()).flat_map(move |c| column(c).map(move |k| (self.row[k], c as u32, self.value[k])))
+    }
+
+    /// The values of the stored entries.
+    pub fn values_mut(&mut self) -> &mut [T] {
+        &mut self.value
+    }
+
+    /// Whether both have room for the same entries, so that one [`SpdSymbolic`] serves both.
+    pub fn same_pattern<U>(&self, other: &SparseHermitian<U>) -> bool {
+        self.col_start == other.col_start && self.row == other.row
     }
 
     /// Number of rows.

@@ -13,7 +13,6 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Strip;
-use super::cut::Cut;
 use crate::field::{CrossField, EdgePath, Metric, Step, pronounced};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
@@ -41,7 +40,6 @@ pub(super) struct Ground<'a> {
     pub mesh: &'a TriMesh,
     pub metric: &'a Metric,
     pub field: &'a CrossField,
-    pub cut: &'a Cut,
     pub uv: &'a [[DVec2; 3]],
     pub flipped: &'a [bool],
     pub mean_edge: f64,
@@ -134,7 +132,7 @@ fn seed(g: &Ground<'_>, step: Step, lean: f64, side: usize) -> Option<(FaceId, L
     // Along `h` runs branch `along` of the chart; to its left, a quarter turn on, the inside, or the outside.
     let inside = |h: HalfedgeId, quarters: i32| {
         let f = g.mesh.face(h);
-        let branch = g.field.branch_along(g.metric, h, lean) - g.cut.turn[f.index()] + quarters;
+        let branch = g.field.branch_along(g.metric, h, lean) + quarters;
         Lift { branch, offset: -component(g.uv[f.index()][h.index() % 3], branch), travelled: 0.0 }
     };
     match (side, left, right) {
@@ -199,7 +197,7 @@ fn conquer_side(
 /// The lift continued from the triangle of `h` to that of its twin `t`, where `d` is the distance at the origin of
 /// `h`.
 fn cross(g: &Ground<'_>, lift: Lift, h: HalfedgeId, t: HalfedgeId, d: f64) -> Lift {
-    let jump = g.cut.jump_across(g.mesh, g.field, h, t);
+    let jump = g.field.jump_across(g.mesh, h);
     // w_to = i^{-p} w_from + T, so that i^{-b} w_from = i^{-(b - p)} w_to up to a constant.
     let branch = (lift.branch - jump).rem_euclid(4);
     let corner = g.mesh.next(t).index() % 3;

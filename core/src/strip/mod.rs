@@ -1,10 +1,9 @@
 //! Strips: the seamless map of which placed curves are isolines, and what each curve's strip covers.
 //!
-//! The room for turning curves along edges into strips. It may use `mesh`, `field`, `solve` and `progress`; it
-//! does not know where the curves come from.
+//! The room for turning curves along edges into strips. It may use `mesh`, `field`, `param` and `progress`;
+//! it does not know where the curves come from.
 
 mod conquer;
-mod cut;
 mod map;
 #[cfg(test)]
 mod tests;
@@ -14,9 +13,9 @@ use glam::{DVec2, DVec3};
 use thiserror::Error;
 
 use crate::field::{self, CrossField, EdgePath, FieldError, Metric, trace_curves};
-use crate::mesh::{EdgeId, FaceId, TriMesh};
+use crate::mesh::{FaceId, TriMesh};
+use crate::param::ParamError;
 use crate::progress::{Cancelled, Progress};
-use crate::solve::{EliminationError, SolveError};
 
 /// Why strips could not be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -24,18 +23,9 @@ pub enum StripError {
     /// The cross field could not be computed.
     #[error(transparent)]
     Field(#[from] FieldError),
-    /// The period jumps of the field contradict its singularities.
-    #[error("the cross field cannot be combed across {edge:?}")]
-    Topology {
-        /// The edge.
-        edge: EdgeId,
-    },
-    /// The constraints could not be eliminated.
+    /// The map could not be computed.
     #[error(transparent)]
-    Elimination(#[from] EliminationError),
-    /// The map could not be solved for.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
+    Map(#[from] ParamError),
     /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -57,7 +47,7 @@ pub struct Strip {
 pub struct StripMap {
     /// The cross field the map follows.
     pub field: CrossField,
-    /// Coordinates of each triangle's corners in the triangle's chart, in lengths on the mesh.
+    /// Coordinates of each triangle's corners in the chart of its cross, in lengths on the mesh.
     pub uv: Vec<[DVec2; 3]>,
     /// Whether the map turns the triangle over or collapses it.
     pub flipped: Vec<bool>,
@@ -99,13 +89,13 @@ impl StripMap {
         field: CrossField,
         progress: &Progress,
     ) -> Result<Self, StripError> {
-        let cut = cut::cut(mesh, &field)?;
-        let uv = map::solve(mesh, metric, &field, &cut, paths, progress)?;
+        let map = map::solve(mesh, metric, &field, paths, progress)?;
         progress.report("strips", 0.9);
-        let flipped: Vec<bool> = uv.iter().map(|&[a, b, c]| (b - a).perp_dot(c - a) <= 0.0).collect();
-        let residual = residual(mesh, metric, &field, &cut, paths, &uv);
+        let flipped: Vec<bool> = mesh.faces().map(|f| map.is_flipped(f)).collect();
+        let uv = map.uv;
+        let residual = residual(mesh, metric, &field, paths, &uv);
         let mean_edge = mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
-        let ground = Ground { mesh, metric, field: &field, cut: &cut, uv: &uv, flipped: &flipped, mean_edge };
+        let ground = Ground { mesh, metric, field: &field, uv: &uv, flipped: &flipped, mean_edge };
         let Conquered { strips, covered, stripe } = conquer::conquer(&ground, paths);
         tracing::debug!(
             faces = mesh.n_faces(),
@@ -128,17 +118,10 @@ impl StripMap {
     }
 }
 
-fn residual(
-    mesh: &TriMesh,
-    metric: &Metric,
-    field: &CrossField,
-    cut: &cut::Cut,
-    paths: &[EdgePath],
-    uv: &[[DVec2; 3]],
-) -> f64 {
+fn residual(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath], uv: &[[DVec2; 3]]) -> f64 {
     let mut worst: f64 = 0.0;
     for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
-        for (h, c) in map::kept_coordinates(mesh, metric, field, cut, *step, lean) {
+        for (h, c) in map::kept_coordinates(mesh, metric, field, *step, lean) {
             let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c as usize]);
             worst = worst.max((a - b).abs());
         }

@@ -6,6 +6,7 @@ mod index;
 mod path;
 mod point;
 mod relax;
+mod straightest;
 
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
@@ -13,3 +14,4 @@ pub use index::SurfaceIndex;
 pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
 pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
+pub use straightest::{PolarMap, Trace, straightest};

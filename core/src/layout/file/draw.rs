@@ -6,12 +6,12 @@
 //! its border, only one way is left for each step between places on the border, so that rounding cannot put a node
 //! on the wrong side of an arc.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::{DVec2, DVec3};
 
 use super::place::{Place, Stop, along_boundary, check_slots, node_place, stops};
-use super::{DrawError, LayoutFile, Part};
+use super::{ArcEnd, DrawError, LayoutFile, Part};
 use crate::dual::{Mark, RefinedMesh};
 use crate::mesh::{EdgeId, FaceId, TriMesh};
 
@@ -23,8 +23,10 @@ pub(super) struct Drawn {
     pub mesh: RefinedMesh,
     /// Vertex of each node.
     pub nodes: Vec<u32>,
-    /// Vertices of each arc.
+    /// Vertices of each arc; those that the file leaves out along the boundary are last.
     pub arcs: Vec<Vec<u32>>,
+    /// Nodes and slots at the ends of each arc.
+    pub ends: Vec<[ArcEnd; 2]>,
 }
 
 /// A piece of an arc between two stops.
@@ -47,8 +49,10 @@ pub(super) fn draw(file: &LayoutFile, base: &TriMesh) -> Result<Drawn, DrawError
     }
     let mut canvas = Canvas { base, mesh: RefinedMesh::new(base), owner: HashMap::new(), on_edge: BTreeMap::new() };
     let nodes = canvas.insert(file, &places, &mut arcs)?;
-    let paths = canvas.connect(file, &places, &nodes, &arcs)?;
-    Ok(Drawn { mesh: canvas.mesh, nodes, arcs: paths })
+    let mut paths = canvas.connect(file, &places, &nodes, &arcs)?;
+    let mut ends = file.arcs.iter().map(|a| a.ends).collect();
+    canvas.complete_boundary(file, &nodes, &mut paths, &mut ends)?;
+    Ok(Drawn { mesh: canvas.mesh, nodes, arcs: paths, ends })
 }
 
 /// The mesh on which is drawn.
@@ -207,7 +211,12 @@ impl Canvas<'_> {
         for (a, stops) in arcs.iter().enumerate() {
             let border = along_boundary(file, self.base, places, a).filter(|_| file.arcs[a].path.is_empty());
             if let Some(ends) = border {
-                let mut path = self.boundary_path(a as u32, ends.map(|n| nodes[n as usize]))?;
+                let arc = a as u32;
+                let meet = |other| DrawError::Meet { first: Part::Arc(other), second: Part::Arc(arc) };
+                let mut path = self.boundary_path(arc, nodes[ends[0] as usize]).map_err(meet)?;
+                if path[path.len() - 1] != nodes[ends[1] as usize] {
+                    return Err(DrawError::OffBoundary { arc });
+                }
                 if file.arcs[a].ends[0].slot != 0 {
                     path.reverse();
                 }
@@ -249,26 +258,47 @@ impl Canvas<'_> {
         Ok(Step { arc, index, face: Some(face), at_inner_node })
     }
 
-    /// The boundary from one node to another, with the surface to the left; marked.
-    fn boundary_path(&mut self, arc: u32, [from, to]: [u32; 2]) -> Result<Vec<u32>, DrawError> {
+    /// The boundary from the node at `from` to the next one, with the surface to the left; marked. The error is what
+    /// is in the way.
+    fn boundary_path(&mut self, arc: u32, from: u32) -> Result<Vec<u32>, u32> {
         let mut path = vec![from];
         loop {
             let h = self.mesh.outgoing(path[path.len() - 1])[0];
-            let v = self.mesh.target(h);
-            if self.mesh.mark(h) != Mark::Free {
-                return Err(DrawError::OffBoundary { arc });
+            if let Mark::Arc(other) = self.mesh.mark(h) {
+                return Err(other);
             }
             self.mesh.set_mark(h, Mark::Arc(arc));
+            let v = self.mesh.target(h);
             path.push(v);
-            if v == to {
-                return Ok(path);
+            match self.owner.get(&v) {
+                Some(Part::Node(_)) => return Ok(path),
+                Some(&Part::Arc(other)) => return Err(other),
+                None => self.owner.insert(v, Part::Arc(arc)),
+            };
+        }
+    }
+
+    /// Adds an arc along the boundary wherever slot 0 of a boundary node is free.
+    fn complete_boundary(
+        &mut self,
+        file: &LayoutFile,
+        nodes: &[u32],
+        arcs: &mut Vec<Vec<u32>>,
+        ends: &mut Vec<[ArcEnd; 2]>,
+    ) -> Result<(), DrawError> {
+        let taken: HashSet<u32> = ends.iter().flatten().filter(|e| e.slot == 0).map(|e| e.node).collect();
+        for (node, &v) in (0..).zip(nodes).filter(|(n, _)| !taken.contains(n)) {
+            if !self.mesh.is_boundary(self.mesh.outgoing(v)[0]) {
+                continue;
             }
-            match self.owner.insert(v, Part::Arc(arc)) {
-                Some(Part::Node(_)) => return Err(DrawError::OffBoundary { arc }),
-                Some(first) => return Err(DrawError::Meet { first, second: Part::Arc(arc) }),
-                None => {}
+            let path = self.boundary_path(arcs.len() as u32, v).map_err(|arc| DrawError::OnBoundary { arc })?;
+            if let Some(&Part::Node(to)) = self.owner.get(&path[path.len() - 1]) {
+                let last = file.nodes[to as usize].valence;
+                ends.push([ArcEnd { node, slot: 0 }, ArcEnd { node: to, slot: last }]);
+                arcs.push(path);
             }
         }
+        Ok(())
     }
 
     /// Draws a step along a mesh edge.

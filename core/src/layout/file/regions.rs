@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use super::draw::Drawn;
 use super::{ArcEnd, DrawError, LayoutFile};
 use crate::dual::{Mark, RefinedMesh, next};
-use crate::layout::embed::Embedding;
+use crate::layout::embed::{Embedding, lengths};
 use crate::layout::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::mesh::FaceId;
 
@@ -37,7 +37,7 @@ impl DrawnCorner {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DrawnRegion {
     /// The half-edges around it in order, with the region to the left; an arc with the region on both its sides
-    /// occurs in both directions. Edges of the boundary belong to it whether an arc runs there or not.
+    /// occurs in both directions.
     pub border: Vec<u32>,
     /// Its corners, in the order of the border.
     pub corners: Vec<DrawnCorner>,
@@ -54,7 +54,8 @@ pub struct Drawing {
     pub nodes: Vec<u32>,
     /// Valence of each node, and whether it lies on the boundary.
     pub kinds: Vec<Node>,
-    /// Vertices of each arc, from its first end to its second.
+    /// Vertices of each arc, from its first end to its second. The file's arcs come first; those after them lie on
+    /// the boundary where the file left them out.
     pub arcs: Vec<Vec<u32>>,
     /// Nodes and slots at the ends of each arc.
     pub ends: Vec<[ArcEnd; 2]>,
@@ -69,7 +70,7 @@ pub struct Drawing {
 
 impl Drawing {
     pub(super) fn new(file: &LayoutFile, drawn: Drawn) -> Result<Self, DrawError> {
-        let Drawn { mesh, nodes, arcs } = drawn;
+        let Drawn { mesh, nodes, arcs, ends } = drawn;
         let kinds = nodes.iter().zip(&file.nodes).map(|(&v, n)| {
             let boundary = mesh.is_boundary(mesh.outgoing(v)[0]);
             Node { valence: n.valence as usize, boundary }
@@ -77,7 +78,7 @@ impl Drawing {
         let mut this = Self {
             base_face: (0..mesh.n_faces() as u32).map(|f| mesh.base_face(f)).collect(),
             kinds: kinds.collect(),
-            ends: file.arcs.iter().map(|a| a.ends).collect(),
+            ends,
             headings: vec![None; 3 * mesh.n_faces()],
             region: Vec::new(),
             regions: Vec::new(),
@@ -296,31 +297,46 @@ impl Drawing {
 
     /// Whether no arc is missing.
     pub fn is_complete(&self) -> bool {
-        let all_drawn = |r: &DrawnRegion| r.border.iter().all(|&h| self.mesh.mark(h) != Mark::Free);
-        self.regions.iter().all(|r| r.corners.iter().all(|c| c.sectors == 1) && all_drawn(r))
+        self.regions.iter().flat_map(|r| &r.corners).all(|c| c.sectors == 1)
     }
 
-    /// The layout and its embedding, region `p` as patch `p`; `None` where arcs are missing.
+    /// The layout and its embedding, with region `p` as patch `p`. Where arcs are missing it has no patches, every arc
+    /// is a chord of its own, and the embedding's seeds are those of the regions.
     ///
     /// # Errors
     ///
     /// [`LayoutError`], should the parts not fit together, which would be a defect of this module.
-    pub fn to_embedding(&self) -> Result<Option<(QuadLayout, Embedding)>, LayoutError> {
-        if !self.is_complete() {
-            return Ok(None);
-        }
-        let arc = |a: usize| Arc { nodes: self.ends[a].map(|e| e.node), boundary: self.is_boundary_arc(a), chord: 0 };
-        let mut patches = Vec::with_capacity(self.regions.len());
-        for (patch, region) in self.regions.iter().enumerate() {
-            let corners =
-                <[DrawnCorner; 4]>::try_from(region.corners.clone()).map_err(|_| LayoutError::Patch { patch })?;
-            let side = |c: DrawnCorner| self.side(region.border[c.at]).ok_or(LayoutError::Patch { patch });
+    pub fn to_embedding(&self) -> Result<(QuadLayout, Embedding), LayoutError> {
+        let arc =
+            |a: usize| Arc { nodes: self.ends[a].map(|e| e.node), boundary: self.is_boundary_arc(a), chord: a as u32 };
+        let (nodes, arcs) = (self.kinds.clone(), (0..self.arcs.len()).map(arc).collect());
+        let layout = if self.is_complete() {
+            QuadLayout::new(nodes, arcs, self.patches()?, self.surface_euler())?
+        } else {
+            QuadLayout { nodes, arcs, patches: Vec::new(), chords: self.arcs.len() }
+        };
+        Ok((layout, self.embedding()))
+    }
+
+    /// The heading of each arc in the region to its left, run through forward and backward.
+    pub fn arc_headings(&self) -> Vec<[Option<u8>; 2]> {
+        let heading = |from: u32, to: u32| {
+            let h = self.mesh.outgoing(from).into_iter().find(|&h| self.mesh.target(h) == to)?;
+            self.headings[h as usize]
+        };
+        self.arcs.iter().map(|path| [heading(path[0], path[1]), heading(path[1], path[0])]).collect()
+    }
+
+    /// The regions of a complete layout as patches.
+    fn patches(&self) -> Result<Vec<Patch>, LayoutError> {
+        let patch = |(patch, region): (usize, &DrawnRegion)| {
+            let broken = LayoutError::Patch { patch };
+            let corners = <[DrawnCorner; 4]>::try_from(region.corners.clone()).map_err(|_| broken.clone())?;
+            let side = |c: DrawnCorner| self.side(region.border[c.at]).ok_or(broken.clone());
             let [a, b, c, d] = corners.map(side);
-            patches.push(Patch { corners: corners.map(|c| c.node), sides: [a?, b?, c?, d?] });
-        }
-        let arcs = (0..self.arcs.len()).map(arc).collect();
-        let layout = QuadLayout::new(self.kinds.clone(), arcs, patches, self.surface_euler())?;
-        Ok(Some((layout, self.embedding())))
+            Ok(Patch { corners: corners.map(|c| c.node), sides: [a?, b?, c?, d?] })
+        };
+        self.regions.iter().enumerate().map(patch).collect()
     }
 
     /// The arc along a half-edge that leaves a node, and whether it runs in its direction.
@@ -336,26 +352,14 @@ impl Drawing {
         self.mesh.n_vertices() as i64 - edges as i64 + self.mesh.n_faces() as i64
     }
 
-    /// The drawing as an embedding, with a vertex inside each region.
     fn embedding(&self) -> Embedding {
-        let mut mesh = self.mesh.clone();
-        let mut base_face = self.base_face.clone();
-        let mut on_border = vec![false; mesh.n_vertices()];
-        for &h in self.regions.iter().flat_map(|r| &r.border) {
-            on_border[mesh.origin(h) as usize] = true;
+        Embedding {
+            mesh: self.mesh.clone(),
+            base_face: self.base_face.clone(),
+            nodes: self.nodes.clone(),
+            arcs: self.arcs.clone(),
+            arc_parameters: self.arcs.iter().map(|path| lengths(&self.mesh.positions, path)).collect(),
+            seeds: self.regions.iter().map(|r| r.border[0] / 3).collect(),
         }
-        let mut crossings = vec![u32::MAX; self.regions.len()];
-        for h in 0..3 * self.mesh.n_faces() as u32 {
-            let v = mesh.origin(h);
-            if !on_border[v as usize] {
-                crossings[self.region[h as usize / 3] as usize] = v;
-            }
-        }
-        for (r, v) in crossings.iter_mut().enumerate().filter(|(_, v)| **v == u32::MAX) {
-            let face = self.regions[r].border[0] / 3;
-            *v = mesh.split_face(face);
-            base_face.extend([base_face[face as usize]; 2]);
-        }
-        Embedding { mesh, base_face, nodes: self.nodes.clone(), arcs: self.arcs.clone(), crossings }
     }
 }

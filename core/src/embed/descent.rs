@@ -1,0 +1,400 @@
+//! Optimising an embedding: field, map and nodes in turn (Campen, sections 6.3 to 6.5).
+//!
+//! With the nodes where they are, the guiding field and the seamless map in which all arcs are isolines are linear
+//! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
+//! another follows; if not, it is taken back and tried at half the length.
+
+use glam::{DVec2, DVec3};
+
+use super::gradient::descent;
+use super::guides::{feature_guides, shape_guides};
+use super::net::{Headings, Net};
+use super::relocate::{Ground, Hold};
+use super::sizing::{SizingSystem, rest_turns};
+use super::{EmbeddingError, voronoi};
+use crate::field::{self, CrossField, GuidedSystem, Metric};
+use crate::layout::{Embedding, QuadLayout};
+use crate::mesh::{HalfedgeId, TriMesh, VertexId};
+use crate::param::{Objective, Relation, SeamlessSystem, Solution};
+use crate::progress::Progress;
+use crate::solve::SpdSymbolic;
+use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex, SurfacePoint};
+
+/// Length of a step over the length of the gradient: the estimator is half as long again as the gradient itself, and
+/// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
+const STEP: f64 = 0.75 * 2.0 / 3.0;
+
+/// The surface a layout is embedded on.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface<'a> {
+    /// Its mesh, of bounding-box diagonal 1.
+    pub mesh: &'a TriMesh,
+    /// Its points by nearness.
+    pub index: &'a SurfaceIndex,
+    /// Principal curvatures at its vertices.
+    pub curvature: &'a [PrincipalCurvature],
+    /// Whether each edge is sharp.
+    pub sharp: &'a [bool],
+}
+
+/// How an embedding is optimised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Steps of the nodes at most.
+    pub steps: usize,
+    /// Halvings of the step at most.
+    pub halvings: usize,
+    /// By how much an error of direction counts more than one of length.
+    pub anisotropy: f64,
+    /// Whether lengths may vary over the surface as the field wants it.
+    pub sizing: bool,
+}
+
+impl Default for Settings {
+    /// Those of the thesis (sections 6.4.3 and 6.5.1).
+    fn default() -> Self {
+        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true }
+    }
+}
+
+/// Field and map for nodes at certain places.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The net: mesh, nodes, arcs.
+    pub net: Net,
+    /// The planar layouts of the mesh's triangles.
+    pub metric: Metric,
+    /// The guiding field.
+    pub field: CrossField,
+    /// What the map minimises.
+    pub objective: Objective,
+    /// The map and its energy.
+    pub solution: Solution,
+}
+
+/// An embedding under optimisation.
+pub struct Optimizer<'a> {
+    surface: Surface<'a>,
+    ground: Ground<'a>,
+    settings: Settings,
+    curvature: Vec<PrincipalCurvature>,
+    sharp: Vec<bool>,
+    guided: GuidedSystem,
+    seamless: Option<SeamlessSystem>,
+    sizes: Option<SpdSymbolic>,
+    state: State,
+    /// Factor of all steps.
+    pace: f64,
+    halved: usize,
+    steps: usize,
+}
+
+impl<'a> Optimizer<'a> {
+    /// Sets up the optimisation of a drawn layout and solves for its first field and map. `pinned` tells the nodes that
+    /// are to stay (empty: none).
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub fn new(
+        surface: Surface<'a>,
+        embedding: &Embedding,
+        layout: &QuadLayout,
+        headings: &[Headings],
+        pinned: &[bool],
+        settings: Settings,
+        progress: &Progress,
+    ) -> Result<Self, EmbeddingError> {
+        let net = Net::new(surface.mesh, embedding, layout, headings)?;
+        progress.check()?;
+        let sharp = sharp_edges(&surface, &net);
+        let ground = ground(&surface, &net, &sharp, pinned);
+        let nearest = |v: usize| {
+            if v < surface.mesh.n_vertices() {
+                return surface.curvature[v];
+            }
+            let at = surface.index.nearest(net.mesh.position(VertexId::new(v)));
+            surface.curvature[at.nearest_vertex(surface.mesh).index()]
+        };
+        let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
+        let guided = GuidedSystem::new(&net.mesh)?;
+        let metric = Metric::new(&net.mesh);
+        let mut solver =
+            Solver { curvature: &curvature, sharp: &sharp, guided: &guided, seamless: None, sizes: None, settings };
+        let state = solver.solve(net, metric, None, progress)?;
+        let (seamless, sizes) = (solver.seamless, solver.sizes);
+        Ok(Self {
+            surface,
+            ground,
+            settings,
+            curvature,
+            sharp,
+            guided,
+            seamless,
+            sizes,
+            state,
+            pace: 1.0,
+            halved: 0,
+            steps: 0,
+        })
+    }
+
+    /// The best so far.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Whether no further step is to be made.
+    pub fn is_done(&self) -> bool {
+        self.steps >= self.settings.steps || self.halved > self.settings.halvings
+    }
+
+    /// Moves the nodes once; tells whether that made the energy less. If not, they are where they were, and the next
+    /// step is shorter.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`]; the state is then as before.
+    pub fn step(&mut self, progress: &Progress) -> Result<bool, EmbeddingError> {
+        self.steps += 1;
+        let net = self.moved();
+        let metric = Metric::new(&net.mesh);
+        let mut solver = Solver {
+            curvature: &self.curvature,
+            sharp: &self.sharp,
+            guided: &self.guided,
+            seamless: self.seamless.take(),
+            sizes: self.sizes.take(),
+            settings: self.settings,
+        };
+        let next = solver.solve(net, metric, Some(&self.state.field.angle), progress);
+        (self.seamless, self.sizes) = (solver.seamless, solver.sizes);
+        let next = next?;
+        let better = next.solution.energy < self.state.solution.energy;
+        tracing::debug!(step = self.steps, pace = self.pace, energy = next.solution.energy, better, "nodes moved");
+        if better {
+            self.state = next;
+        } else {
+            self.pace *= 0.5;
+            self.halved += 1;
+        }
+        Ok(better)
+    }
+
+    /// The net with every node moved by one step.
+    fn moved(&self) -> Net {
+        let State { net, metric, field, objective, solution } = &self.state;
+        let mut moved = net.clone();
+        let cell = voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>());
+        // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
+        let steep = 0.5 * (1.0 + self.settings.anisotropy);
+        for (i, node) in net.nodes.iter().enumerate() {
+            let v = node.vertex;
+            if self.ground.hold[i] == Hold::Fixed {
+                continue;
+            }
+            let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
+            let step = d * (STEP * self.pace / steep);
+            if !(step.length() > 0.0 && step.is_finite()) {
+                continue;
+            }
+            match self.ground.hold[i] {
+                Hold::Free => {
+                    // The polar map is that of the mesh before any node moved: close by nothing else changes.
+                    self.ground.glide(&mut moved, metric, i, step, &cell);
+                }
+                Hold::Curve => {
+                    let along = self.in_space(&net.mesh, metric, v, step);
+                    self.ground.slide(&mut moved, i, along, along.length());
+                }
+                Hold::Fixed => {}
+            }
+        }
+        moved
+    }
+
+    /// A vector of the polar map of `v` in space.
+    fn in_space(&self, mesh: &TriMesh, metric: &Metric, v: VertexId, step: DVec2) -> DVec3 {
+        let polar = PolarMap::new(mesh, metric, v);
+        let (h, turn) = polar.wedge(step.to_angle().rem_euclid(std::f64::consts::TAU));
+        metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
+    }
+
+    /// The surface.
+    pub fn surface(&self) -> &Surface<'a> {
+        &self.surface
+    }
+}
+
+/// What field and map are solved with.
+struct Solver<'s> {
+    curvature: &'s [PrincipalCurvature],
+    sharp: &'s [bool],
+    guided: &'s GuidedSystem,
+    seamless: Option<SeamlessSystem>,
+    sizes: Option<SpdSymbolic>,
+    settings: Settings,
+}
+
+impl Solver<'_> {
+    fn solve(
+        &mut self,
+        net: Net,
+        metric: Metric,
+        previous: Option<&[f64]>,
+        progress: &Progress,
+    ) -> Result<State, EmbeddingError> {
+        let mesh = &net.mesh;
+        let guides = self.guides(&net, &metric);
+        let angle =
+            self.guided.solve(mesh, &metric, &net.jump, &guides, previous.or(Some(&net.angle)), progress)?.angle;
+        progress.check()?;
+        let field = field::cross_field(mesh, &metric, &angle, &net.jump);
+        let lengths = if self.settings.sizing {
+            let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
+            self.sizes = Some(system.symbolic());
+            let rest = rest_turns(mesh, &metric, &angle, &net.jump);
+            system.lengths(mesh, &metric, &rest)?
+        } else {
+            Vec::new()
+        };
+        let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
+        let relations = relations(&net, &metric, &angle, self.sharp);
+        let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
+        let system = match self.seamless.take() {
+            Some(mut system) => {
+                system.rebuild(mesh, &field, &nodes, &relations)?;
+                self.seamless.insert(system)
+            }
+            None => self.seamless.insert(SeamlessSystem::new(mesh, &field, &nodes, &relations)?),
+        };
+        progress.check()?;
+        let solution = system.solve(&metric, &field, &objective, progress)?;
+        Ok(State { net, metric, field, objective, solution })
+    }
+
+    fn guides(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
+        let mesh = &net.mesh;
+        let mut guides = shape_guides(mesh, metric, self.curvature, self.sharp);
+        guides.extend(feature_guides(mesh, metric, self.sharp));
+        for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
+            if let Some(&(k, _)) = net.boundary.get(&h) {
+                let (face, angle) = (mesh.face(h), metric.direction(h));
+                guides.push(field::Guide { face, angle, weight: field::RELIABLE, branch: Some(i32::from(k)) });
+            }
+        }
+        guides
+    }
+}
+
+/// That every arc is an isoline, and every edge of the boundary and of a feature.
+fn relations(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<Relation> {
+    let mesh = &net.mesh;
+    let along = |k: i32| if k % 2 == 0 { 1 } else { 0 };
+    let mut relations: Vec<Relation> = net
+        .arcs
+        .iter()
+        .filter(|a| !a.boundary)
+        .map(|a| Relation {
+            from: corner(a.start),
+            crossed: a.crossed.clone(),
+            to: corner(a.end),
+            axis: along(i32::from(a.heading)),
+            difference: 0.0,
+        })
+        .collect();
+    let on_edge = |h: HalfedgeId, k: i32| Relation {
+        from: corner(h),
+        crossed: Vec::new(),
+        to: corner(mesh.next(h)),
+        axis: along(k),
+        difference: 0.0,
+    };
+    for e in mesh.edges() {
+        let h = mesh.halfedge(e);
+        if let Some(&(k, _)) = net.boundary.get(&h) {
+            relations.push(on_edge(h, i32::from(k)));
+        } else if sharp[e.index()] && !mesh.is_boundary_edge(e) {
+            let turns = (metric.direction(h) - angle[mesh.face(h).index()]) / std::f64::consts::FRAC_PI_2;
+            relations.push(on_edge(h, (turns.round() as i32).rem_euclid(4)));
+        }
+    }
+    relations
+}
+
+/// The corner at the origin of a half-edge as a point of the surface.
+fn corner(h: HalfedgeId) -> SurfacePoint {
+    let mut weights = [0.0; 3];
+    weights[h.index() % 3] = 1.0;
+    SurfacePoint { face: crate::mesh::FaceId::new(h.index() / 3), weights }
+}
+
+/// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.
+fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<bool> {
+    let n = surface.mesh.n_vertices();
+    let pair = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
+    let sharp: std::collections::BTreeSet<_> = surface
+        .mesh
+        .edges()
+        .filter(|e| surface.sharp[e.index()])
+        .map(|e| surface.mesh.edge_vertices(e))
+        .map(|[a, b]| pair(a, b))
+        .collect();
+    net.mesh
+        .edges()
+        .map(|e| {
+            let [a, b] = net.mesh.edge_vertices(e);
+            if a.index() < n && b.index() < n {
+                return sharp.contains(&pair(a, b));
+            }
+            // A half of a sharp edge: on it lies the inserted vertex, between the two ends.
+            let (new, old) = if a.index() >= n { (a, b) } else { (b, a) };
+            let p = net.mesh.position(new);
+            let q = net.mesh.position(old);
+            net.mesh.outgoing(new).map(|h| net.mesh.target(h)).any(|w| {
+                let r = net.mesh.position(w);
+                let flat = (q - p).cross(r - p).length() < 1e-9 * q.distance(r).powi(2) && (q - p).dot(r - p) < 0.0;
+                w.index() < n && old.index() < n && flat && sharp.contains(&pair(old, w))
+            })
+        })
+        .collect()
+}
+
+fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: &[bool]) -> Ground<'a> {
+    let mesh = &net.mesh;
+    let curve: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] || mesh.is_boundary_edge(e)).collect();
+    let mut degree = vec![0; mesh.n_vertices()];
+    for e in mesh.edges().filter(|e| curve[e.index()]) {
+        for v in mesh.edge_vertices(e) {
+            degree[v.index()] += 1;
+        }
+    }
+    let hold = net
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(i, n)| match degree[n.vertex.index()] {
+            _ if pinned.get(i).copied().unwrap_or(false) => Hold::Fixed,
+            0 => Hold::Free,
+            2 if !turns(mesh, &curve, n.vertex) => Hold::Curve,
+            _ => Hold::Fixed,
+        })
+        .collect();
+    let on_curve = degree.iter().map(|&d| d > 0).collect();
+    Ground { surface: surface.mesh, index: surface.index, home: mesh.positions().to_vec(), curve, on_curve, hold }
+}
+
+/// Cosine below which a curve has a corner: half way to a right angle.
+const CORNER: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Whether the two curve edges at `v` meet in a corner.
+fn turns(mesh: &TriMesh, curve: &[bool], v: VertexId) -> bool {
+    let ends: Vec<DVec3> = mesh
+        .outgoing(v)
+        .flat_map(|h| [h, mesh.prev(h)])
+        .filter(|&h| curve[mesh.edge(h).index()])
+        .map(|h| if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) })
+        .map(|w| (mesh.position(w) - mesh.position(v)).normalize_or_zero())
+        .collect();
+    ends.iter().any(|a| ends.iter().all(|b| a == b || -a.dot(*b) < CORNER))
+}

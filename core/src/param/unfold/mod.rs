@@ -1,0 +1,249 @@
+//! Removal of folds from seamless maps.
+//!
+//! Least squares do not care for orientation: near fixed points triangles may be turned over. Around each group of
+//! such triangles the energy is minimised again with everything outside kept in place and every triangle inside
+//! confined to a convex set of orientation preserving maps (Campen, section 6.5.3). Where no such map exists the
+//! surroundings grow, at last to the whole surface with its seams and relations. What remains is stiffened and then
+//! tried again. The outcome never has more folds than the input; for each that remains it tells why.
+
+mod domain;
+mod local;
+mod shape;
+mod stiffen;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::progress::{Cancelled, Progress};
+use crate::solve::Reduction;
+use domain::{Domain, Neighbours};
+use shape::Shape;
+
+/// How many rings of triangles around folds may move, one try after the other. Three rings leave a regular vertex
+/// some 50 others to give way; beyond 24 rings the whole surface is as quick.
+const RINGS: [u32; 4] = [3, 6, 12, 24];
+/// In the whole surface triangles up to this many rings from a fold are confined from the start, the others where
+/// they turn out to fold.
+const CONFINED_RINGS: u32 = 6;
+/// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
+const WIDEST_CORNER: f64 = 175.0;
+
+/// A triangle of a map that is to follow a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrientedTriangle {
+    /// The corners in the triangle's plane, counter-clockwise.
+    pub layout: [DVec2; 3],
+    /// The unit vector that `∇u` should follow; `∇v` should follow the one a quarter turn further.
+    pub axis: DVec2,
+    /// The lengths that `∇u` and `∇v` should have; positive.
+    pub lengths: DVec2,
+    /// The weight in the energy, usually the area.
+    pub weight: f64,
+    /// How much more misalignment counts than wrong length; 1 for the Euclidean norm.
+    pub ratio: f64,
+    /// The vertices of the mesh at the corners.
+    pub vertices: [u32; 3],
+    /// The coordinates u and v of each corner: a variable of the reduction, and the sign it is taken with.
+    pub corners: [[(u32, f64); 2]; 3],
+}
+
+/// A map given by its free variables, and what it should be like.
+#[derive(Debug, Clone, Copy)]
+pub struct OrientationProblem<'a> {
+    /// All triangles of the surface.
+    pub triangles: &'a [OrientedTriangle],
+    /// The variables as expressions of the free ones.
+    pub reduction: &'a Reduction,
+    /// For each vertex the angle around it in the map, in quarter turns: the valence of the field there, 4 where it is
+    /// regular; 0 for an angle that is not prescribed, as at a boundary.
+    pub quarters: &'a [u32],
+}
+
+/// Why a triangle remains folded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FoldReason {
+    /// The triangles at this vertex cannot span its angle, each corner being less than 180°: it needs more triangles.
+    HighValence {
+        /// The vertex.
+        vertex: u32,
+        /// The angle wanted, in quarter turns.
+        quarters: u32,
+        /// The triangles there are.
+        triangles: u32,
+    },
+    /// The constraints leave the triangle no choice: its corners are fixed, or one of its coordinates is constant.
+    Fixed,
+    /// No map without this fold was found.
+    NotResolved,
+}
+
+/// A triangle that remains folded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fold {
+    /// The triangle.
+    pub triangle: u32,
+    /// Why.
+    pub reason: FoldReason,
+}
+
+/// A map with its folds removed as far as possible.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unfolded {
+    /// The free variables.
+    pub y: Vec<f64>,
+    /// Number of folds before.
+    pub folds_before: usize,
+    /// Folds that remain, ascending.
+    pub folds: Vec<Fold>,
+    /// The energy before.
+    pub energy_before: f64,
+    /// The energy now.
+    pub energy: f64,
+}
+
+impl OrientationProblem<'_> {
+    /// The weighted squared difference of the map's gradients from those wanted.
+    pub fn energy(&self, y: &[f64]) -> f64 {
+        let x = self.reduction.expand(y);
+        self.triangles.iter().map(|t| t.energy(t.gradients(&x))).sum()
+    }
+
+    /// The triangles that are turned over or flat where the variables are `x`, ascending.
+    fn folded(&self, x: &[f64]) -> Vec<u32> {
+        let folded = |t: &OrientedTriangle| Shape::new(t.gradients(x), t.lengths).is_folded();
+        (0..).zip(self.triangles).filter(|(_, t)| folded(t)).map(|(i, _)| i).collect()
+    }
+}
+
+/// Removes folds from the map with free variables `y`. Without folds the same bits come back.
+///
+/// # Errors
+///
+/// [`Cancelled`].
+pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> Result<Unfolded, Cancelled> {
+    progress.report("Removing folds", 0.0);
+    let folded = problem.folded(&problem.reduction.expand(y));
+    let energy_before = problem.energy(y);
+    let mut out =
+        Unfolded { y: y.to_vec(), folds_before: folded.len(), folds: Vec::new(), energy_before, energy: energy_before };
+    if folded.is_empty() {
+        return Ok(out);
+    }
+    let neighbours = Neighbours::new(problem);
+    let crowded = crowded_vertices(problem, &neighbours);
+    let mut spared = vec![false; problem.triangles.len()];
+    for &t in crowded.keys().flat_map(|&v| neighbours.around(v)) {
+        spared[t as usize] = true;
+    }
+    for &t in &folded {
+        spared[t as usize] |= local::is_fixed(problem, t);
+    }
+    if y.iter().all(|y| y.is_finite()) {
+        let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
+        let mut best = attempt.relieve(y)?;
+        if best.folds > 0
+            && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
+        {
+            let other = attempt.relieve(&stiff)?;
+            if (other.folds, other.energy) < (best.folds, best.energy) {
+                best = other;
+            }
+        }
+        if problem.folded(&problem.reduction.expand(&best.y)).len() < folded.len() {
+            out.energy = best.energy;
+            out.y = best.y;
+        }
+    }
+    let remaining = problem.folded(&problem.reduction.expand(&out.y));
+    out.folds = remaining.into_iter().map(|t| Fold { triangle: t, reason: reason(problem, &crowded, t) }).collect();
+    tracing::debug!(before = out.folds_before, after = out.folds.len(), energy_before, out.energy, "folds removed");
+    Ok(out)
+}
+
+/// Vertices with too few triangles for their angle, and how many quarter turns and triangles they have.
+fn crowded_vertices(problem: &OrientationProblem, neighbours: &Neighbours) -> BTreeMap<u32, (u32, u32)> {
+    let n = neighbours.n_vertices().min(problem.quarters.len());
+    let at = |v: u32| (problem.quarters[v as usize], neighbours.around(v).len() as u32);
+    let too_few = |&(_, (quarters, triangles)): &(u32, (u32, u32))| {
+        triangles > 0 && f64::from(quarters) * 90.0 > f64::from(triangles) * WIDEST_CORNER
+    };
+    (0..n as u32).map(|v| (v, at(v))).filter(too_few).collect()
+}
+
+fn reason(problem: &OrientationProblem, crowded: &BTreeMap<u32, (u32, u32)>, t: u32) -> FoldReason {
+    let vertices = problem.triangles[t as usize].vertices;
+    if let Some((vertex, &(quarters, triangles))) = vertices.iter().find_map(|v| crowded.get_key_value(v)) {
+        return FoldReason::HighValence { vertex: *vertex, quarters, triangles };
+    }
+    if local::is_fixed(problem, t) { FoldReason::Fixed } else { FoldReason::NotResolved }
+}
+
+/// A map and how good it is.
+struct Candidate {
+    y: Vec<f64>,
+    /// Folds other than those spared.
+    folds: usize,
+    energy: f64,
+}
+
+/// Removal by constraints.
+struct Attempt<'a> {
+    problem: &'a OrientationProblem<'a>,
+    neighbours: &'a Neighbours,
+    /// Triangles that cannot be unfolded and must not hinder the others.
+    spared: &'a [bool],
+    progress: &'a Progress,
+}
+
+impl Attempt<'_> {
+    /// Unfolds domain by domain, larger and larger ones, at last the whole.
+    fn relieve(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
+        let mut y = y.to_vec();
+        let first = self.folds(&y);
+        let mut before: Vec<Domain> = Vec::new();
+        for (i, rings) in RINGS.into_iter().enumerate() {
+            let folds = self.folds(&y);
+            if folds.is_empty() {
+                break;
+            }
+            self.progress.report("Removing folds", (i as f64 + 0.5) / (RINGS.len() as f64 + 2.0));
+            let domains = self.neighbours.domains(self.problem, &folds, rings);
+            // A domain that could not grow will not do better.
+            let grown: Vec<&Domain> = domains.iter().filter(|d| !before.contains(d)).collect();
+            let x = self.problem.reduction.expand(&y);
+            let found: Vec<_> = grown
+                .par_iter()
+                .map(|d| local::straighten(self.problem, d, &y, &x, self.spared, |_| true, self.progress))
+                .collect::<Result<_, _>>()?;
+            for (domain, values) in grown.into_iter().zip(found) {
+                for (&i, value) in domain.inner.iter().zip(values.into_iter().flatten()) {
+                    y[i as usize] = value;
+                }
+            }
+            before = domains;
+        }
+        if !self.folds(&y).is_empty() {
+            self.progress.report("Removing folds", 0.7);
+            let distance = self.neighbours.distance(self.problem, &first, CONFINED_RINGS);
+            let near = |t: u32| distance[t as usize] != u32::MAX;
+            let x = self.problem.reduction.expand(&y);
+            let whole = self.neighbours.whole(self.problem);
+            if let Some(values) = local::straighten(self.problem, &whole, &y, &x, self.spared, near, self.progress)? {
+                for (&i, value) in whole.inner.iter().zip(values) {
+                    y[i as usize] = value;
+                }
+            }
+        }
+        Ok(Candidate { folds: self.folds(&y).len(), energy: self.problem.energy(&y), y })
+    }
+
+    /// Folds that there is hope for.
+    fn folds(&self, y: &[f64]) -> Vec<u32> {
+        let folded = self.problem.folded(&self.problem.reduction.expand(y));
+        folded.into_iter().filter(|&t| !self.spared[t as usize]).collect()
+    }
+}

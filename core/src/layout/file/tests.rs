@@ -9,6 +9,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::dual::{Arrangement, Mark};
+use crate::embed::Net;
 use crate::layout::{Embedding, QuadLayout, embed, map_patches};
 use crate::mesh::HalfedgeId;
 use crate::progress::Progress;
@@ -501,6 +502,27 @@ fn the_example_of_the_documentation_is_a_layout() {
     let (layout, embedding) = drawing.to_embedding().unwrap();
     assert_eq!((layout.nodes.len(), layout.patches.len(), layout.chords), (6, 2, 3));
     round_trip(&mesh, &layout, &embedding);
+}
+
+#[test]
+fn drawings_with_arcs_missing_determine_a_field() {
+    let mesh = cube(4);
+    let (torus, grid) = torus_grid();
+    let (square, sheet) = square_grid();
+    for (mesh, mut file) in [(&mesh, cube_file(&mesh, 4)), (&torus, grid), (&square, sheet)] {
+        for _ in 0..3 {
+            let drawing = file.draw(mesh).unwrap();
+            let (layout, embedding) = drawing.to_embedding().unwrap();
+            // It checks the index of every vertex.
+            Net::new(mesh, &embedding, &layout, &drawing.arc_headings()).unwrap();
+            let spare = (0..file.arcs.len()).find(|&a| {
+                let mut fewer = file.clone();
+                fewer.arcs.remove(a);
+                fewer.draw(mesh).is_ok_and(|d| d.regions.len() < drawing.regions.len())
+            });
+            file.arcs.remove(spare.unwrap());
+        }
+    }
 }
 
 proptest! {

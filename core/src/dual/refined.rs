@@ -168,6 +168,18 @@ impl RefinedMesh {
         list
     }
 
+    /// The neighbours of a vertex, counter-clockwise; at the boundary from the target of the boundary half-edge that
+    /// leaves it to the origin of the one that arrives.
+    pub fn spokes(&self, v: u32) -> Vec<u32> {
+        let outgoing = self.outgoing(v);
+        let mut list: Vec<u32> = outgoing.iter().map(|&h| self.target(h)).collect();
+        let last = outgoing[outgoing.len() - 1];
+        if self.is_boundary(prev(last)) {
+            list.push(self.opposite(last));
+        }
+        list
+    }
+
     /// Half-edge from `a` to `b` or, where only that exists, from `b` to `a`.
     pub fn find(&self, a: u32, b: u32) -> Option<u32> {
         self.outgoing(a).into_iter().find_map(|h| {

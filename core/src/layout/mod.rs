@@ -1,16 +1,22 @@
 //! Quad layouts: their structure, read off an arrangement of dual curves, and a first embedding.
 //!
 //! Data flows [`structure`] → [`embed`] (nodes and arcs on the surface) → [`patch`] (each patch mapped to a
-//! rectangle). The room knows arrangements, not how their curves came about.
+//! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. The room knows arrangements,
+//! not how their curves came about.
 
 mod disc;
 mod embed;
+mod file;
 mod patch;
 mod piece;
 mod structure;
 
 pub(crate) use disc::flipped;
 pub use embed::{EmbedError, Embedding, embed};
+pub use file::{
+    ArcEnd, DrawError, Drawing, DrawnCorner, DrawnRegion, FileArc, FileNode, LayoutFile, LayoutFileError, Part,
+    PathPoint,
+};
 pub(crate) use patch::{Lookup, border_sides, flood};
 pub use patch::{PatchError, PatchMap, map_patches};
 pub(crate) use piece::Piece;

@@ -141,6 +141,15 @@ impl QuadLayout {
             }
             patches.push(Patch { corners, sides });
         }
+        Self::new(nodes, arcs, patches, euler)
+    }
+
+    /// The layout of these parts, on a surface of Euler characteristic `euler`; the chords are found here.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::check`].
+    pub fn new(nodes: Vec<Node>, arcs: Vec<Arc>, patches: Vec<Patch>, euler: i64) -> Result<Self, LayoutError> {
         let mut layout = Self { nodes, arcs, patches, chords: 0 };
         layout.find_chords();
         layout.check(euler)?;

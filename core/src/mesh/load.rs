@@ -100,6 +100,9 @@ pub enum LoadError {
     /// The file cannot be read.
     #[error("{0}")]
     Io(#[from] std::io::Error),
+    /// No built-in model of this name.
+    #[error("there is no built-in model named “{0}”")]
+    UnknownModel(String),
     /// A folder, a pipe or a device.
     #[error("this is not a regular file")]
     NotAFile,

@@ -9,6 +9,7 @@ mod kernel;
 mod load;
 mod read;
 mod repair;
+mod source;
 mod topology;
 mod triangulate;
 mod write;
@@ -18,5 +19,6 @@ pub use features::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edg
 pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
 pub use load::{FaceRef, LoadError, LoadedMesh, Normalization, VertexRef, load, parse};
 pub use repair::Repair;
+pub use source::{MeshSource, fingerprint};
 pub use topology::{Component, Topology};
 pub use write::{write_mesh_obj, write_obj};

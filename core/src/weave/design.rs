@@ -1,13 +1,12 @@
 //! The document: which mesh, which options, which strips in which order.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::model::Options;
-use crate::mesh::{LoadError, LoadedMesh, TriMesh, builtin, load};
+use crate::mesh::{MeshSource, TriMesh, fingerprint};
 use crate::surface::SurfaceCurve;
 
 /// Number of a strip, never used again within one design.
@@ -28,53 +27,9 @@ pub struct Strip {
     pub visible: bool,
 }
 
-/// Where the mesh of a design comes from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MeshSource {
-    /// A model that comes with the program.
-    Builtin(String),
-    /// A file.
-    File(PathBuf),
-}
-
-impl MeshSource {
-    /// The built-in model of this name, or else the file at this path.
-    pub fn from_name(name: &str) -> Self {
-        if builtin(name).is_some() { Self::Builtin(name.to_owned()) } else { Self::File(PathBuf::from(name)) }
-    }
-
-    /// Reads the mesh; a relative path is relative to `folder`.
-    ///
-    /// # Errors
-    ///
-    /// What reading says.
-    pub fn load(&self, folder: &Path) -> Result<LoadedMesh, DesignError> {
-        match self {
-            Self::Builtin(name) => builtin(name).ok_or_else(|| DesignError::UnknownModel(name.clone())),
-            Self::File(path) => Ok(load(&folder.join(path))?),
-        }
-    }
-}
-
-impl fmt::Display for MeshSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Builtin(name) => f.write_str(name),
-            Self::File(path) => write!(f, "{}", path.display()),
-        }
-    }
-}
-
 /// Why a design could not be read or written.
 #[derive(Debug, Error)]
 pub enum DesignError {
-    /// No built-in model of this name.
-    #[error("there is no built-in model named “{0}”")]
-    UnknownModel(String),
-    /// The mesh could not be read.
-    #[error(transparent)]
-    Mesh(#[from] LoadError),
     /// The file could not be read or written.
     #[error("{path}: {source}")]
     File {
@@ -163,24 +118,4 @@ impl Design {
         let fits = fingerprint(mesh) == self.fingerprint && self.strips.iter().all(|s| s.curve.check(mesh).is_ok());
         if fits { Ok(()) } else { Err(DesignError::OtherMesh { mesh: self.mesh.to_string() }) }
     }
-}
-
-/// A short text that changes with the connectivity or the shape of the mesh (FNV-1a over all of it).
-fn fingerprint(mesh: &TriMesh) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325u64;
-    let mut eat = |bytes: &[u8]| {
-        for &b in bytes {
-            hash = (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
-        }
-    };
-    for h in mesh.halfedges() {
-        eat(&mesh.origin(h).0.to_le_bytes());
-    }
-    for p in mesh.positions() {
-        // Rounded, so that a file read back with fewer digits is still the same mesh.
-        for x in p.to_array() {
-            eat(&((x * 1e6).round() as i64).to_le_bytes());
-        }
-    }
-    format!("{}-{}-{hash:016x}", mesh.n_vertices(), mesh.n_faces())
 }

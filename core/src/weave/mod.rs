@@ -14,10 +14,12 @@ mod suggest;
 mod tests;
 mod woven;
 
-pub use design::{Design, DesignError, MeshSource, Strip, StripId};
+pub use design::{Design, DesignError, Strip, StripId};
 pub use export::{Export, ExportOptions, QuadSize, export, write_all};
 pub use model::{Model, Options};
 pub use script::{Script, ScriptError, Step, replay};
 pub use session::{Proposal, Session, WeaveError};
 pub use suggest::{Goal, Stuck};
 pub use woven::Woven;
+
+pub use crate::mesh::MeshSource;

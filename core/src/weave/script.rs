@@ -9,10 +9,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::design::{DesignError, MeshSource};
 use super::model::Options;
 use super::session::{Proposal, Session, WeaveError};
 use super::suggest::{Goal, Stuck};
+use crate::mesh::{LoadError, MeshSource};
 use crate::progress::Progress;
 
 /// One step of a designer.
@@ -69,7 +69,7 @@ pub enum ScriptError {
     },
     /// The mesh could not be read.
     #[error(transparent)]
-    Mesh(#[from] DesignError),
+    Mesh(#[from] LoadError),
     /// A step failed.
     #[error("step {step}: {source}")]
     Step {

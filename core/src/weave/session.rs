@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::design::{Design, DesignError, MeshSource, Strip, StripId};
+use super::design::{Design, DesignError, Strip, StripId};
 use super::model::{Model, Options};
 use super::suggest::Stuck;
 use super::woven::Woven;
@@ -13,7 +13,7 @@ use crate::dual::{Arrangement, ArrangementError};
 use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
 use crate::field::FieldError;
 use crate::layout::{EmbedError, LayoutError, PatchError};
-use crate::mesh::{LoadedMesh, TriMesh};
+use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
 
@@ -32,6 +32,9 @@ pub enum WeaveError {
     /// Strips could not be arranged.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
+    /// The mesh could not be read.
+    #[error(transparent)]
+    Mesh(#[from] LoadError),
     /// The design could not be read, written or replayed.
     #[error(transparent)]
     Design(#[from] DesignError),

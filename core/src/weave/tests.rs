@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::dual::Colour;
+use crate::layout::LayoutFile;
 use crate::mesh::{LoadedMesh, Normalization, TriMesh, builtin};
 use crate::progress::Progress;
 use crate::testing::{grid, square, torus};
@@ -49,6 +50,12 @@ fn three_suggestions_separate_the_corners_of_a_cube() {
     let export = export(&s, &ExportOptions::default(), &progress).unwrap();
     assert_eq!((export.layout.nodes.len(), export.layout.patches.len()), (8, 6));
     assert!(export.layout.nodes.iter().all(|n| n.valence == 3));
+
+    let mesh = &s.model().mesh;
+    let source = s.design().mesh.clone();
+    let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.embedding).unwrap();
+    let (again, _) = file.draw(mesh).unwrap().to_embedding().unwrap();
+    assert_eq!((again.nodes, again.patches.len()), (export.layout.nodes, 6));
 }
 
 #[test]

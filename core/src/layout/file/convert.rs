@@ -1,0 +1,268 @@
+//! From edge paths in a refined mesh to a layout file.
+//!
+//! A refinement consists of chains of vertices along each edge of the mesh and of vertices inside its triangles.
+//! An arc crosses an edge where it comes out of one triangle and goes on in another; all else of its path may be
+//! forgotten, since the order of the crossings along each edge says how arcs lie to each other.
+
+use std::collections::{HashMap, HashSet};
+
+use super::{ArcEnd, Drawing, FileArc, FileNode, LayoutFile, LayoutFileError, PathPoint};
+use crate::dual::RefinedMesh;
+use crate::layout::embed::Embedding;
+use crate::layout::structure::{Node, QuadLayout};
+use crate::mesh::{EdgeId, FaceId, HalfedgeId, MeshSource, TriMesh, VertexId};
+use crate::surface::{Crossing, SurfacePoint};
+
+/// Least distance of two places on an edge from each other and from its ends, as a fraction of the edge: far above
+/// rounding, so that the order survives, and far below what can be seen.
+const GAP: f64 = 1e-9;
+
+impl LayoutFile {
+    /// A layout embedded on `base`, such as a woven one. Nothing is fixed.
+    ///
+    /// # Errors
+    ///
+    /// [`LayoutFileError::NotOnMesh`] or [`LayoutFileError::Ends`] if layout, embedding and mesh do not belong
+    /// together.
+    pub fn from_embedding(
+        source: MeshSource,
+        base: &TriMesh,
+        layout: &QuadLayout,
+        embedding: &Embedding,
+    ) -> Result<Self, LayoutFileError> {
+        let Embedding { mesh, base_face, nodes, arcs, .. } = embedding;
+        let slots = slots(mesh, &layout.nodes, nodes, arcs)?;
+        let mut ends = Vec::with_capacity(arcs.len());
+        for (arc, (path, of)) in arcs.iter().zip(&layout.arcs).enumerate() {
+            let slot = |edge: (u32, u32)| slots.get(&edge).copied().ok_or(LayoutFileError::NotOnMesh { arc });
+            let (first, last) = ((path[0], path[1]), (path[path.len() - 1], path[path.len() - 2]));
+            let [p, q] = of.nodes;
+            ends.push([ArcEnd { node: p, slot: slot(first)? }, ArcEnd { node: q, slot: slot(last)? }]);
+        }
+        Paths { base, mesh, base_face }.write(source, &layout.nodes, nodes, arcs, &ends)
+    }
+
+    /// A drawn layout, complete or not. Nothing is fixed.
+    ///
+    /// # Errors
+    ///
+    /// [`LayoutFileError::NotOnMesh`] if the drawing is not one on `base`.
+    pub fn from_drawing(source: MeshSource, base: &TriMesh, drawing: &Drawing) -> Result<Self, LayoutFileError> {
+        let Drawing { mesh, base_face, nodes, kinds, arcs, ends, .. } = drawing;
+        Paths { base, mesh, base_face }.write(source, kinds, nodes, arcs, ends)
+    }
+}
+
+/// The slot of every edge that leaves a node along an arc of a complete layout, by its two vertices.
+fn slots(
+    mesh: &RefinedMesh,
+    kinds: &[Node],
+    nodes: &[u32],
+    arcs: &[Vec<u32>],
+) -> Result<HashMap<(u32, u32), u32>, LayoutFileError> {
+    let leaving: HashSet<(u32, u32)> = arcs
+        .iter()
+        .filter(|path| path.len() > 1)
+        .flat_map(|path| [(path[0], path[1]), (path[path.len() - 1], path[path.len() - 2])])
+        .collect();
+    let mut slots = HashMap::new();
+    for (node, (&v, kind)) in nodes.iter().zip(kinds).enumerate() {
+        let mut ends = 0;
+        for w in mesh.spokes(v) {
+            if leaving.contains(&(v, w)) {
+                slots.insert((v, w), ends);
+                ends += 1;
+            }
+        }
+        let ends = ends as usize;
+        if ends != kind.valence + usize::from(kind.boundary) {
+            return Err(LayoutFileError::Ends { node, valence: kind.valence, ends });
+        }
+    }
+    Ok(slots)
+}
+
+/// Where a vertex of a refinement lies on the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Spot {
+    Vertex(VertexId),
+    /// On an edge, at this fraction along the edge's own half-edge.
+    Edge(EdgeId, f64),
+    Inside(FaceId),
+}
+
+/// A mesh and a refinement of it.
+struct Paths<'a> {
+    base: &'a TriMesh,
+    mesh: &'a RefinedMesh,
+    base_face: &'a [u32],
+}
+
+impl Paths<'_> {
+    fn write(
+        &self,
+        source: MeshSource,
+        kinds: &[Node],
+        nodes: &[u32],
+        arcs: &[Vec<u32>],
+        ends: &[[ArcEnd; 2]],
+    ) -> Result<LayoutFile, LayoutFileError> {
+        let crossings: Vec<Vec<(u32, Option<HalfedgeId>)>> =
+            arcs.iter().enumerate().map(|(a, path)| self.places(a, path)).collect::<Result<_, _>>()?;
+        let used = nodes.iter().copied().chain(crossings.iter().flatten().map(|c| c.0));
+        let spots = self.spots(used.collect())?;
+        let mut file = LayoutFile::new(source, self.base);
+        for (&v, kind) in nodes.iter().zip(kinds) {
+            file.nodes.push(FileNode { at: self.point(v, spots[&v]), valence: kind.valence as u32, fixed: false });
+        }
+        for (places, &ends) in crossings.into_iter().zip(ends) {
+            let point = |(v, crossed): (u32, Option<HalfedgeId>)| match (spots[&v], crossed) {
+                (Spot::Edge(e, t), Some(halfedge)) => {
+                    let t = if self.base.halfedge(e) == halfedge { t } else { 1.0 - t };
+                    PathPoint::Crossing(Crossing { halfedge, t })
+                }
+                _ => PathPoint::Vertex { vertex: VertexId(v) },
+            };
+            file.arcs.push(FileArc { ends, fixed: false, path: places.into_iter().map(point).collect() });
+        }
+        Ok(file)
+    }
+
+    /// The vertices at which an arc crosses an edge, each with the half-edge in the triangle that it leaves, and
+    /// those that are vertices of the mesh. None for an arc along the boundary.
+    fn places(&self, arc: usize, path: &[u32]) -> Result<Vec<(u32, Option<HalfedgeId>)>, LayoutFileError> {
+        let mut places = Vec::new();
+        let mut current = None;
+        let mut on_boundary = true;
+        for w in path.windows(2) {
+            if (w[0] as usize) < self.base.n_vertices() && w[0] != path[0] {
+                places.push((w[0], None));
+                current = None;
+            }
+            let Some(h) = self.mesh.find(w[0], w[1]) else {
+                return Err(LayoutFileError::NotOnMesh { arc });
+            };
+            let twin = self.mesh.twin(h);
+            on_boundary &= twin.is_none();
+            let [left, right] = [Some(h), twin].map(|h| h.map(|h| self.base_face[h as usize / 3]));
+            if left != right {
+                continue;
+            }
+            if let (Some(f), Some(g)) = (current, left)
+                && f != g
+            {
+                let halfedge = self.between(f, g).ok_or(LayoutFileError::NotOnMesh { arc })?;
+                places.push((w[0], Some(halfedge)));
+            }
+            current = left;
+        }
+        Ok(if on_boundary { Vec::new() } else { places })
+    }
+
+    /// The half-edge of triangle `f` towards triangle `g`.
+    fn between(&self, f: u32, g: u32) -> Option<HalfedgeId> {
+        if f as usize >= self.base.n_faces() {
+            return None;
+        }
+        let towards = |&h: &HalfedgeId| self.base.twin(h).is_some_and(|t| self.base.face(t).0 == g);
+        self.base.face_halfedges(FaceId(f)).into_iter().find(towards)
+    }
+
+    /// Whether half-edge `h` of the refinement lies on an edge of the mesh.
+    fn on_edge(&self, h: u32) -> bool {
+        self.mesh.twin(h).is_none_or(|t| self.base_face[t as usize / 3] != self.base_face[h as usize / 3])
+    }
+
+    /// Where the vertices `used` lie. On each edge those used are kept apart.
+    fn spots(&self, used: Vec<u32>) -> Result<HashMap<u32, Spot>, LayoutFileError> {
+        let n_base = self.base.n_vertices() as u32;
+        let mut spots: HashMap<u32, Spot> = HashMap::new();
+        for v in used {
+            let face = FaceId(self.base_face[self.mesh.outgoing(v)[0] as usize / 3]);
+            spots.insert(v, if v < n_base { Spot::Vertex(VertexId(v)) } else { Spot::Inside(face) });
+        }
+        for e in self.base.edges() {
+            let chain = self.chain(self.base.halfedge(e)).ok_or(LayoutFileError::OtherRefinement)?;
+            let along = self.along(&chain);
+            let on_edge: Vec<usize> = (1..chain.len() - 1).filter(|&i| spots.contains_key(&chain[i])).collect();
+            let fractions = apart(on_edge.iter().map(|&i| along[i]).collect());
+            for (i, t) in on_edge.into_iter().zip(fractions) {
+                spots.insert(chain[i], Spot::Edge(e, t));
+            }
+        }
+        Ok(spots)
+    }
+
+    /// The vertices of the refinement along a half-edge of the mesh, its ends included.
+    fn chain(&self, h: HalfedgeId) -> Option<Vec<u32>> {
+        let (start, end, face) = (self.base.origin(h).0, self.base.target(h).0, self.base.face(h).0);
+        // The only edge that leaves a vertex on `h` with the triangle to its left is the next one along `h`.
+        let next = |v: u32| {
+            let along = |&g: &u32| self.base_face[g as usize / 3] == face && self.on_edge(g);
+            self.mesh.outgoing(v).into_iter().find(along).map(|g| self.mesh.target(g))
+        };
+        let mut chain = vec![start, next(start)?];
+        while chain[chain.len() - 1] >= self.base.n_vertices() as u32 && chain.len() <= self.mesh.n_vertices() {
+            chain.push(next(chain[chain.len() - 1])?);
+        }
+        (chain[chain.len() - 1] == end).then_some(chain)
+    }
+
+    /// Fractions of the length along a chain of vertices.
+    fn along(&self, chain: &[u32]) -> Vec<f64> {
+        let position = |v: u32| self.mesh.positions[v as usize];
+        let mut along = vec![0.0];
+        for w in chain.windows(2) {
+            along.push(along[along.len() - 1] + position(w[0]).distance(position(w[1])));
+        }
+        let total = along[along.len() - 1].max(f64::MIN_POSITIVE);
+        along.into_iter().map(|s| s / total).collect()
+    }
+
+    /// The point of the mesh where a vertex lies.
+    fn point(&self, v: u32, spot: Spot) -> SurfacePoint {
+        match spot {
+            Spot::Vertex(v) => {
+                let h = self.base.vertex_halfedge(v);
+                corner_weights(h, [1.0, 0.0, 0.0])
+            }
+            Spot::Edge(e, t) => corner_weights(self.base.halfedge(e), [1.0 - t, t, 0.0]),
+            Spot::Inside(face) => {
+                let [a, b, c] = self.base.face_vertices(face).map(|v| self.base.position(v));
+                let p = self.mesh.positions[v as usize];
+                let normal = self.base.face_normal(face);
+                // Never on the border of the triangle, where a vertex inside it would change its meaning.
+                let parts = [(b, c), (c, a), (a, b)].map(|(x, y)| (x - p).cross(y - p).dot(normal));
+                let total = parts.iter().map(|w| w.max(0.0)).sum::<f64>().max(f64::MIN_POSITIVE);
+                let inner = parts.map(|w| (w / total).max(GAP));
+                let sum: f64 = inner.iter().sum();
+                SurfacePoint { face, weights: inner.map(|w| w / sum) }
+            }
+        }
+    }
+}
+
+/// The point with these weights of the origin, the target and the opposite corner of a half-edge.
+fn corner_weights(h: HalfedgeId, weights: [f64; 3]) -> SurfacePoint {
+    let mut point = SurfacePoint { face: FaceId(h.0 / 3), weights: [0.0; 3] };
+    for (i, w) in weights.into_iter().enumerate() {
+        point.weights[(h.0 as usize + i) % 3] = w;
+    }
+    point
+}
+
+/// Increasing fractions, moved by as little as keeps them apart from each other and from 0 and 1.
+fn apart(mut fractions: Vec<f64>) -> Vec<f64> {
+    let gap = GAP.min(0.5 / (fractions.len() + 1) as f64);
+    let mut least = gap;
+    for t in &mut fractions {
+        *t = t.max(least);
+        least = *t + gap;
+    }
+    let mut most = 1.0 - gap;
+    for t in fractions.iter_mut().rev() {
+        *t = t.min(most);
+        most = *t - gap;
+    }
+    fractions
+}

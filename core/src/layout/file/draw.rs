@@ -1,0 +1,360 @@
+//! Drawing nodes and arcs as vertices and edge paths.
+//!
+//! First all nodes inside triangles, then all places on mesh edges become vertices, in their order along each edge.
+//! Afterwards every step of an arc lies in one triangle of the mesh, between two vertices that exist, and is drawn
+//! there without crossing what is drawn already. Steps at nodes inside a triangle come first: once these are tied to
+//! its border, only one way is left for each step between places on the border, so that rounding cannot put a node
+//! on the wrong side of an arc.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use glam::{DVec2, DVec3};
+
+use super::place::{Place, Stop, along_boundary, check_slots, node_place, stops};
+use super::{ArcEnd, DrawError, LayoutFile, Part};
+use crate::dual::{Mark, RefinedMesh};
+use crate::mesh::{EdgeId, FaceId, TriMesh};
+
+/// A node this near to the side of a part of a triangle, in weights, splits the side instead of the part.
+const ON_SIDE: f64 = 1e-9;
+
+/// What is drawn, before its regions are known.
+pub(super) struct Drawn {
+    pub mesh: RefinedMesh,
+    /// Vertex of each node.
+    pub nodes: Vec<u32>,
+    /// Vertices of each arc; those that the file leaves out along the boundary are last.
+    pub arcs: Vec<Vec<u32>>,
+    /// Nodes and slots at the ends of each arc.
+    pub ends: Vec<[ArcEnd; 2]>,
+}
+
+/// A piece of an arc between two stops.
+struct Step {
+    arc: u32,
+    index: usize,
+    /// The triangle it lies in; none along a mesh edge.
+    face: Option<FaceId>,
+    /// Whether one end is a node inside the triangle.
+    at_inner_node: bool,
+}
+
+pub(super) fn draw(file: &LayoutFile, base: &TriMesh) -> Result<Drawn, DrawError> {
+    let places: Vec<Place> =
+        file.nodes.iter().enumerate().map(|(n, node)| node_place(base, n as u32, node)).collect::<Result<_, _>>()?;
+    check_slots(file, base, &places)?;
+    let mut arcs = Vec::with_capacity(file.arcs.len());
+    for a in 0..file.arcs.len() {
+        arcs.push(stops(file, base, &places, a)?);
+    }
+    let mut canvas = Canvas { base, mesh: RefinedMesh::new(base), owner: HashMap::new(), on_edge: BTreeMap::new() };
+    let nodes = canvas.insert(file, &places, &mut arcs)?;
+    let mut paths = canvas.connect(file, &places, &nodes, &arcs)?;
+    let mut ends = file.arcs.iter().map(|a| a.ends).collect();
+    canvas.complete_boundary(file, &nodes, &mut paths, &mut ends)?;
+    Ok(Drawn { mesh: canvas.mesh, nodes, arcs: paths, ends })
+}
+
+/// The mesh on which is drawn.
+struct Canvas<'a> {
+    base: &'a TriMesh,
+    mesh: RefinedMesh,
+    /// Who takes a vertex.
+    owner: HashMap<u32, Part>,
+    /// Places on each edge in order: who is there.
+    on_edge: BTreeMap<EdgeId, Vec<Part>>,
+}
+
+impl Canvas<'_> {
+    /// Makes vertices of all nodes and stops; returns those of the nodes.
+    fn insert(&mut self, file: &LayoutFile, places: &[Place], arcs: &mut [Vec<Stop>]) -> Result<Vec<u32>, DrawError> {
+        let mut nodes = vec![u32::MAX; places.len()];
+        let mut parts = HashMap::new();
+        let mut on_edges: Vec<(EdgeId, f64, Part, usize)> = Vec::new();
+        for (n, &place) in places.iter().enumerate() {
+            match place {
+                Place::Vertex(v) => {
+                    nodes[n] = v.0;
+                    self.take(v.0, Part::Node(n as u32))?;
+                }
+                Place::Edge(e, t) => on_edges.push((e, t, Part::Node(n as u32), 0)),
+                Place::Inside(f) => nodes[n] = self.insert_inside(file, n as u32, f, &nodes, &mut parts)?,
+            }
+        }
+        for (a, stops) in arcs.iter_mut().enumerate() {
+            let last = stops.len() - 1;
+            for (k, stop) in stops.iter_mut().enumerate().take(last).skip(1) {
+                match stop.place {
+                    Place::Vertex(v) => {
+                        stop.vertex = v.0;
+                        self.take(v.0, Part::Arc(a as u32))?;
+                    }
+                    Place::Edge(e, t) => on_edges.push((e, t, Part::Arc(a as u32), k)),
+                    Place::Inside(_) => {}
+                }
+            }
+        }
+        self.insert_on_edges(on_edges, &mut nodes, arcs)?;
+        for (arc, stops) in file.arcs.iter().zip(arcs.iter_mut()) {
+            let last = stops.len() - 1;
+            stops[0].vertex = nodes[arc.ends[0].node as usize];
+            stops[last].vertex = nodes[arc.ends[1].node as usize];
+        }
+        Ok(nodes)
+    }
+
+    /// Makes vertices of places on edges: where, whose, and which stop of an arc.
+    fn insert_on_edges(
+        &mut self,
+        mut on_edges: Vec<(EdgeId, f64, Part, usize)>,
+        nodes: &mut [u32],
+        arcs: &mut [Vec<Stop>],
+    ) -> Result<(), DrawError> {
+        on_edges.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)));
+        for run in on_edges.chunk_by(|x, y| x.0 == y.0) {
+            if let Some(w) = run.windows(2).find(|w| w[0].1 >= w[1].1) {
+                return Err(DrawError::Meet { first: w[0].2, second: w[1].2 });
+            }
+            self.on_edge.insert(run[0].0, run.iter().map(|x| x.2).collect());
+            let (mut rest, mut from) = (self.whole_edge(run[0].0), 0.0);
+            for &(_, t, part, k) in run {
+                let x = self.mesh.split_edge(rest, (t - from) / (1.0 - from));
+                (rest, from) = (self.mesh.any_outgoing(x), t);
+                self.owner.insert(x, part);
+                match part {
+                    Part::Node(n) => nodes[n as usize] = x,
+                    Part::Arc(a) => arcs[a as usize][k].vertex = x,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The half-edge of an edge that has not been split yet; splits beside it may have changed its number.
+    fn whole_edge(&self, e: EdgeId) -> u32 {
+        let h = self.base.halfedge(e);
+        let along = |&g: &u32| self.mesh.base_halfedge(g) == Some(h.0);
+        self.mesh.outgoing(self.base.origin(h).0).into_iter().find(along).unwrap_or(h.0)
+    }
+
+    fn take(&mut self, vertex: u32, part: Part) -> Result<(), DrawError> {
+        match self.owner.insert(vertex, part) {
+            Some(first) => Err(DrawError::Meet { first, second: part }),
+            None => Ok(()),
+        }
+    }
+
+    /// Makes a vertex of node `n` inside triangle `f`, of which `parts` lists the pieces so far. All is measured
+    /// in weights, where the triangle is never degenerate.
+    fn insert_inside(
+        &mut self,
+        file: &LayoutFile,
+        n: u32,
+        f: FaceId,
+        nodes: &[u32],
+        parts: &mut HashMap<u32, Vec<u32>>,
+    ) -> Result<u32, DrawError> {
+        let weights = |w: [f64; 3]| DVec2::new(w[1], w[2]);
+        let at = file.nodes[n as usize].at;
+        let point = weights(at.weights);
+        let corners = self.base.face_vertices(f);
+        let flat = |v: u32| {
+            let corner = corners.iter().position(|c| c.0 == v);
+            corner.map(|i| [DVec2::ZERO, DVec2::X, DVec2::Y][i]).unwrap_or_else(|| {
+                let node = nodes.iter().position(|&w| w == v);
+                node.map_or(DVec2::ZERO, |i| weights(file.nodes[i].at.weights))
+            })
+        };
+        let list = parts.entry(f.0).or_insert_with(|| vec![f.0]);
+        // The piece that contains it, and the side of that piece to which it is nearest.
+        let (mut best, mut depth) = (3 * f.0, f64::NEG_INFINITY);
+        for &part in list.iter() {
+            let [a, b, c] = self.mesh.corners(part).map(flat);
+            let area = (b - a).perp_dot(c - a);
+            let inside = [(a, b), (b, c), (c, a)].map(|(p, q)| (q - p).perp_dot(point - p) / area);
+            let side = (0..3).min_by(|&i, &j| inside[i].total_cmp(&inside[j])).unwrap_or(0);
+            if inside[side] > depth {
+                (best, depth) = (3 * part + side as u32, inside[side]);
+            }
+        }
+        for v in self.mesh.corners(best / 3) {
+            if let Some(&owner @ Part::Node(other)) = self.owner.get(&v)
+                && file.nodes[other as usize].at == at
+            {
+                return Err(DrawError::Meet { first: owner, second: Part::Node(n) });
+            }
+        }
+        let before = self.mesh.n_faces() as u32;
+        let x = if depth < ON_SIDE && self.mesh.base_halfedge(best).is_none() {
+            let [a, b] = [self.mesh.origin(best), self.mesh.target(best)].map(flat);
+            let t = (point - a).dot(b - a) / (b - a).length_squared();
+            self.mesh.split_edge(best, t.clamp(ON_SIDE, 1.0 - ON_SIDE))
+        } else {
+            self.mesh.split_face(best / 3)
+        };
+        self.mesh.positions[x as usize] = at.position(self.base);
+        list.extend(before..self.mesh.n_faces() as u32);
+        self.owner.insert(x, Part::Node(n));
+        Ok(x)
+    }
+
+    /// Draws all arcs; returns their vertices.
+    fn connect(
+        &mut self,
+        file: &LayoutFile,
+        places: &[Place],
+        nodes: &[u32],
+        arcs: &[Vec<Stop>],
+    ) -> Result<Vec<Vec<u32>>, DrawError> {
+        let mut steps = Vec::new();
+        let mut paths: Vec<Vec<Vec<u32>>> = Vec::with_capacity(arcs.len());
+        for (a, stops) in arcs.iter().enumerate() {
+            let border = along_boundary(file, self.base, places, a).filter(|_| file.arcs[a].path.is_empty());
+            if let Some(ends) = border {
+                let arc = a as u32;
+                let meet = |other| DrawError::Meet { first: Part::Arc(other), second: Part::Arc(arc) };
+                let mut path = self.boundary_path(arc, nodes[ends[0] as usize]).map_err(meet)?;
+                if path[path.len() - 1] != nodes[ends[1] as usize] {
+                    return Err(DrawError::OffBoundary { arc });
+                }
+                if file.arcs[a].ends[0].slot != 0 {
+                    path.reverse();
+                }
+                paths.push(vec![path]);
+                continue;
+            }
+            for index in 0..stops.len() - 1 {
+                steps.push(self.step(a as u32, index, stops)?);
+            }
+            paths.push(vec![Vec::new(); stops.len() - 1]);
+        }
+        steps.sort_by_key(|s| (s.face.is_some(), !s.at_inner_node, s.arc, s.index));
+        for step in &steps {
+            let ends = [0, 1].map(|i| arcs[step.arc as usize][step.index + i]);
+            let drawn = match step.face {
+                Some(face) => self.draw_inside(step.arc, face, ends)?,
+                None => self.draw_along(step.arc, ends)?,
+            };
+            paths[step.arc as usize][step.index] = drawn;
+        }
+        Ok(paths.into_iter().map(chain).collect())
+    }
+
+    /// Where a step runs.
+    fn step(&self, arc: u32, index: usize, stops: &[Stop]) -> Result<Step, DrawError> {
+        let (from, to) = (stops[index], stops[index + 1]);
+        let inner = |s: Stop| matches!(s.place, Place::Inside(_));
+        let at_inner_node = inner(from) || inner(to);
+        let gap = DrawError::Gap { arc, step: index };
+        if from.vertex == to.vertex {
+            return Err(gap);
+        }
+        if from.faces.is_none() && to.faces.is_none() && from.place.common_edge(self.base, to.place).is_some() {
+            return Ok(Step { arc, index, face: None, at_inner_node });
+        }
+        let before = from.faces.map_or_else(|| from.place.faces(self.base), |f| vec![f[1]]);
+        let after = to.faces.map_or_else(|| to.place.faces(self.base), |f| vec![f[0]]);
+        let face = before.into_iter().find(|f| after.contains(f)).ok_or(gap)?;
+        Ok(Step { arc, index, face: Some(face), at_inner_node })
+    }
+
+    /// The boundary from the node at `from` to the next one, with the surface to the left; marked. The error is what
+    /// is in the way.
+    fn boundary_path(&mut self, arc: u32, from: u32) -> Result<Vec<u32>, u32> {
+        let mut path = vec![from];
+        loop {
+            let h = self.mesh.outgoing(path[path.len() - 1])[0];
+            if let Mark::Arc(other) = self.mesh.mark(h) {
+                return Err(other);
+            }
+            self.mesh.set_mark(h, Mark::Arc(arc));
+            let v = self.mesh.target(h);
+            path.push(v);
+            match self.owner.get(&v) {
+                Some(Part::Node(_)) => return Ok(path),
+                Some(&Part::Arc(other)) => return Err(other),
+                None => self.owner.insert(v, Part::Arc(arc)),
+            };
+        }
+    }
+
+    /// Adds an arc along the boundary wherever slot 0 of a boundary node is free.
+    fn complete_boundary(
+        &mut self,
+        file: &LayoutFile,
+        nodes: &[u32],
+        arcs: &mut Vec<Vec<u32>>,
+        ends: &mut Vec<[ArcEnd; 2]>,
+    ) -> Result<(), DrawError> {
+        let taken: HashSet<u32> = ends.iter().flatten().filter(|e| e.slot == 0).map(|e| e.node).collect();
+        for (node, &v) in (0..).zip(nodes).filter(|(n, _)| !taken.contains(n)) {
+            if !self.mesh.is_boundary(self.mesh.outgoing(v)[0]) {
+                continue;
+            }
+            let path = self.boundary_path(arcs.len() as u32, v).map_err(|arc| DrawError::OnBoundary { arc })?;
+            if let Some(&Part::Node(to)) = self.owner.get(&path[path.len() - 1]) {
+                let last = file.nodes[to as usize].valence;
+                ends.push([ArcEnd { node, slot: 0 }, ArcEnd { node: to, slot: last }]);
+                arcs.push(path);
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws a step along a mesh edge.
+    fn draw_along(&mut self, arc: u32, [from, to]: [Stop; 2]) -> Result<Vec<u32>, DrawError> {
+        let (p, q) = (from.vertex, to.vertex);
+        let edge = from.place.common_edge(self.base, to.place);
+        let between = |part: &Part| self.owner.get(&p) != Some(part) && self.owner.get(&q) != Some(part);
+        let meet = |first: Part| DrawError::Meet { first, second: Part::Arc(arc) };
+        let Some(h) = self.mesh.find(p, q).filter(|&h| self.mesh.base_halfedge(h).is_some()) else {
+            let there = edge.and_then(|e| self.on_edge.get(&e)).and_then(|list| list.iter().copied().find(between));
+            return Err(meet(there.unwrap_or(Part::Arc(arc))));
+        };
+        if let Mark::Arc(other) = self.mesh.mark(h) {
+            return Err(meet(Part::Arc(other)));
+        }
+        self.mesh.set_mark(h, Mark::Arc(arc));
+        Ok(vec![p, q])
+    }
+
+    /// Draws a step inside a triangle.
+    fn draw_inside(&mut self, arc: u32, face: FaceId, ends: [Stop; 2]) -> Result<Vec<u32>, DrawError> {
+        let (p, q) = (ends[0].vertex, ends[1].vertex);
+        if let Some(h) = self.mesh.find(p, q)
+            && let Mark::Arc(other) = self.mesh.mark(h)
+        {
+            return Err(DrawError::Meet { first: Part::Arc(other), second: Part::Arc(arc) });
+        }
+        let [a, b, _] = self.base.face_vertices(face).map(|v| self.base.position(v));
+        let x = (b - a).normalize_or(DVec3::X);
+        let y = self.base.face_area_vector(face).cross(x).normalize_or_zero();
+        let plane = |m: &RefinedMesh, v: u32| {
+            let d = m.positions[v as usize] - a;
+            DVec2::new(d.dot(x), d.dot(y))
+        };
+        let inside = |m: &RefinedMesh, f: u32| m.base_face(f) == face.0;
+        if let Ok(path) = self.mesh.draw((p, q), Mark::Arc(arc), inside, |_| true, plane) {
+            return Ok(path);
+        }
+        // What is in the way is found by drawing across it.
+        let across = self.mesh.draw((p, q), Mark::Arc(arc), inside, |_| false, plane);
+        let Ok(path) = across else { return Err(DrawError::NoWay { arc, face }) };
+        let other =
+            path[1..path.len() - 1].iter().flat_map(|&v| self.mesh.outgoing(v)).find_map(|h| match self.mesh.mark(h) {
+                Mark::Arc(other) if other != arc => Some(other),
+                _ => None,
+            });
+        Err(DrawError::Cross { first: other.unwrap_or(arc), second: arc, face })
+    }
+}
+
+/// One path of several that follow each other.
+fn chain(pieces: Vec<Vec<u32>>) -> Vec<u32> {
+    let mut path: Vec<u32> = Vec::new();
+    for piece in pieces {
+        path.pop();
+        path.extend(piece);
+    }
+    path
+}

@@ -4,16 +4,17 @@
 //! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
 //! another follows; if not, it is taken back and tried at half the length.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
 
+use super::cross::step_to_crossing;
 use super::gradient::descent;
 use super::guides::{feature_guides, shape_guides};
 use super::net::{Headings, Net};
 use super::relocate::{Ground, Hold};
 use super::sizing::{SizingSystem, rest_turns};
-use super::straight::{Crossroads, corner};
+use super::straight::{ArcEnd, Crossroads, corner};
 use super::{EmbeddingError, voronoi};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::layout::{Embedding, QuadLayout};
@@ -93,6 +94,8 @@ pub struct Optimizer<'a> {
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
     roads: Crossroads,
+    /// The ends of arcs at each node.
+    ends: Vec<Vec<ArcEnd>>,
     guided: GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
@@ -123,6 +126,11 @@ impl<'a> Optimizer<'a> {
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);
         let roads = Crossroads::new(layout, |i| pinned.get(i).copied().unwrap_or(false));
+        let mut ends = vec![Vec::new(); layout.nodes.len()];
+        for (a, arc) in (0..).zip(&layout.arcs) {
+            ends[arc.nodes[0] as usize].push((a, false));
+            ends[arc.nodes[1] as usize].push((a, true));
+        }
         let ground = ground(&surface, &net, &sharp, pinned);
         let nearest = |v: usize| {
             if v < surface.mesh.n_vertices() {
@@ -152,6 +160,7 @@ impl<'a> Optimizer<'a> {
             curvature,
             sharp,
             roads,
+            ends,
             guided,
             seamless,
             sizes,
@@ -217,6 +226,10 @@ impl<'a> Optimizer<'a> {
             if self.ground.hold[i] == Hold::Fixed {
                 continue;
             }
+            if !self.roads.held[i] {
+                self.cross(&mut moved, i, &cell);
+                continue;
+            }
             let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
             let step = d * (STEP * self.pace / steep);
             if !(step.length() > 0.0 && step.is_finite()) {
@@ -237,10 +250,34 @@ impl<'a> Optimizer<'a> {
         moved
     }
 
+    /// Brings a regular node towards the crossing of its isolines.
+    fn cross(&self, moved: &mut Net, i: usize, cell: &[u32]) {
+        let State { net, metric, solution, .. } = &self.state;
+        let found = step_to_crossing(net, &self.roads, metric, &solution.map, &self.ends[i]);
+        let Some((corner, step)) = found.filter(|(_, step)| step.is_finite() && step.length() > 0.0) else { return };
+        let mesh = &net.mesh;
+        let v = net.nodes[i].vertex;
+        match self.ground.hold[i] {
+            Hold::Free => {
+                let polar = PolarMap::new(mesh, metric, v);
+                let from = polar.spokes.iter().find(|s| s.0 == corner).map_or(0.0, |s| s.1);
+                let turn = step.to_angle() - metric.direction(corner);
+                let turn = turn - (turn / TAU).round() * TAU;
+                let step = DVec2::from_angle(from + polar.scale * turn) * step.length();
+                self.ground.glide(moved, metric, i, step, cell);
+            }
+            Hold::Curve => {
+                let along = metric.tangent(mesh, mesh.face(corner), step.to_angle()) * step.length();
+                self.ground.slide(moved, i, along, along.length());
+            }
+            Hold::Fixed => {}
+        }
+    }
+
     /// A vector of the polar map of `v` in space.
     fn in_space(&self, mesh: &TriMesh, metric: &Metric, v: VertexId, step: DVec2) -> DVec3 {
         let polar = PolarMap::new(mesh, metric, v);
-        let (h, turn) = polar.wedge(step.to_angle().rem_euclid(std::f64::consts::TAU));
+        let (h, turn) = polar.wedge(step.to_angle().rem_euclid(TAU));
         metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
     }
 
@@ -453,37 +490,4 @@ fn turns(mesh: &TriMesh, curve: &[bool], v: VertexId) -> bool {
         .map(|w| (mesh.position(w) - mesh.position(v)).normalize_or_zero())
         .collect();
     ends.iter().any(|a| ends.iter().all(|b| a == b || -a.dot(*b) < CORNER))
-}
-
-impl Optimizer<'_> {
-    #[allow(missing_docs)]
-    pub fn probe(&mut self, node: usize, eps: f64) -> Option<(f64, f64, [f64; 4], f64)> {
-        let State { net, metric, field, objective, solution } = self.state.clone();
-        let v = net.nodes[node].vertex;
-        if !self.roads.held[node] || self.ground.hold[node] != Hold::Free {
-            return None;
-        }
-        let d = descent(&net.mesh, &metric, &field.angle, &solution.map.uv, &objective, v);
-        let mut e = [0.0; 4];
-        let mut moved = 0.0;
-        for k in 0..4 {
-            let mut m = net.clone();
-            let cell = voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>());
-            let step = DVec2::from_angle(d.to_angle() + std::f64::consts::FRAC_PI_2 * k as f64) * eps;
-            moved = self.ground.glide(&mut m, &metric, node, step, &cell);
-            let metric = Metric::new(&m.mesh);
-            let mut solver = Solver {
-                curvature: &self.curvature,
-                sharp: &self.sharp,
-                roads: &self.roads,
-                guided: &self.guided,
-                seamless: None,
-                sizes: None,
-                settings: self.settings,
-            };
-            e[k] = solver.solve(m, metric, Some(&field.angle), &Progress::new()).unwrap().solution.energy
-                - solution.energy;
-        }
-        Some((d.length(), moved, e, metric.length(net.mesh.vertex_halfedge(v))))
-    }
 }

@@ -7,6 +7,7 @@
 //! The room knows layouts and drawings, not how they came about.
 
 mod bending;
+mod cross;
 mod descent;
 mod emerge;
 mod gradient;

@@ -103,13 +103,18 @@ impl Crossroads {
         (list, false)
     }
 
-    /// From a regular node the chains to the next nodes that hold, in one direction of each of its two isolines: what
-    /// tells its place.
-    pub(super) fn ways(&self, net: &Net, layout_end: ArcEnd) -> Option<Chain> {
-        let (list, closed) = self.walk(layout_end);
+    /// From the end of an arc at a regular node straight on to the next node that is held, if there is one.
+    pub(super) fn way(&self, net: &Net, end: ArcEnd) -> Option<Chain> {
+        let (list, closed) = self.walk(end);
         let tail = list.last()?;
         let node = net.arcs[tail.0 as usize].nodes[usize::from(!tail.1)] as usize;
         if closed || !self.held[node] { None } else { join(net, &list) }
+    }
+
+    /// Holds all nodes to their arcs.
+    pub(super) fn hold_all(&mut self) {
+        self.held.fill(true);
+        self.opposite.fill([None; 2]);
     }
 }
 
@@ -139,7 +144,7 @@ fn join(net: &Net, list: &[ArcEnd]) -> Option<Chain> {
 
 /// The half-edges crossed from the triangle of one corner to that of another at the same vertex, which is regular, so
 /// that any way around will do.
-fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<HalfedgeId>> {
+pub(super) fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<HalfedgeId>> {
     let mut crossed = Vec::new();
     let mut at = from;
     while mesh.face(at) != mesh.face(to) {

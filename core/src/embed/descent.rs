@@ -11,15 +11,15 @@ use glam::{DVec2, DVec3};
 use super::cross::step_to_crossing;
 use super::gradient::descent;
 use super::guides::{feature_guides, shape_guides};
-use super::net::{Headings, Net};
+use super::net::Net;
+use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::sizing::{SizingSystem, rest_turns};
 use super::straight::{ArcEnd, Crossroads, corner};
 use super::{EmbeddingError, voronoi};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
-use crate::layout::{Embedding, QuadLayout};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
-use crate::param::{Objective, Relation, SeamlessSystem, Solution};
+use crate::param::{Fold, Objective, Relation, SeamlessSystem, Solution};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
@@ -37,6 +37,9 @@ const DISAGREES: f64 = 0.35;
 const DRAWN: f64 = 0.5;
 /// Rounds of guiding the first field, in each of which more directions come to agree.
 const FIRST_ROUNDS: usize = 4;
+
+/// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
+const SETTLING: usize = 3;
 
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +91,6 @@ pub struct State {
 
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
-    surface: Surface<'a>,
     ground: Ground<'a>,
     settings: Settings,
     curvature: Vec<PrincipalCurvature>,
@@ -107,25 +109,18 @@ pub struct Optimizer<'a> {
 }
 
 impl<'a> Optimizer<'a> {
-    /// Sets up the optimisation of a drawn layout and solves for its first field and map. `pinned` tells the nodes that
-    /// are to stay (empty: none).
+    /// Sets up the optimisation of a drawn layout and solves for its first field and map.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub fn new(
-        surface: Surface<'a>,
-        embedding: &Embedding,
-        layout: &QuadLayout,
-        headings: &[Headings],
-        pinned: &[bool],
-        settings: Settings,
-        progress: &Progress,
-    ) -> Result<Self, EmbeddingError> {
-        let net = Net::new(surface.mesh, embedding, layout, headings)?;
+    pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
+        let Job { surface, layout, settings, .. } = *job;
+        let pinned = |i: usize| job.pinned_nodes.get(i).copied().unwrap_or(false);
+        let net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);
-        let roads = Crossroads::new(layout, |i| pinned.get(i).copied().unwrap_or(false));
+        let roads = Crossroads::new(layout, pinned);
         let mut ends = vec![Vec::new(); layout.nodes.len()];
         for (a, arc) in (0..).zip(&layout.arcs) {
             ends[arc.nodes[0] as usize].push((a, false));
@@ -154,7 +149,6 @@ impl<'a> Optimizer<'a> {
         let state = solver.solve(net, metric, None, progress)?;
         let (seamless, sizes) = (solver.seamless, solver.sizes);
         Ok(Self {
-            surface,
             ground,
             settings,
             curvature,
@@ -190,19 +184,7 @@ impl<'a> Optimizer<'a> {
     pub fn step(&mut self, progress: &Progress) -> Result<bool, EmbeddingError> {
         self.steps += 1;
         let net = self.moved();
-        let metric = Metric::new(&net.mesh);
-        let mut solver = Solver {
-            curvature: &self.curvature,
-            sharp: &self.sharp,
-            roads: &self.roads,
-            guided: &self.guided,
-            seamless: self.seamless.take(),
-            sizes: self.sizes.take(),
-            settings: self.settings,
-        };
-        let next = solver.solve(net, metric, Some(&self.state.field.angle), progress);
-        (self.seamless, self.sizes) = (solver.seamless, solver.sizes);
-        let next = next?;
+        let next = self.solve(net, progress)?;
         let better = next.solution.energy < self.state.solution.energy;
         tracing::debug!(step = self.steps, pace = self.pace, energy = next.solution.energy, better, "nodes moved");
         if better {
@@ -218,7 +200,7 @@ impl<'a> Optimizer<'a> {
     fn moved(&self) -> Net {
         let State { net, metric, field, objective, solution } = &self.state;
         let mut moved = net.clone();
-        let cell = voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>());
+        let cell = self.cells();
         // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
         let steep = 0.5 * (1.0 + self.settings.anisotropy);
         for (i, node) in net.nodes.iter().enumerate() {
@@ -281,9 +263,69 @@ impl<'a> Optimizer<'a> {
         metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
     }
 
-    /// The surface.
-    pub fn surface(&self) -> &Surface<'a> {
-        &self.surface
+    /// Ends the optimisation: brings regular nodes onto their isolines and holds them there, and removes folds. What is
+    /// returned besides the final state are the folds that remain.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub fn finish(mut self, progress: &Progress) -> Result<(State, Vec<Fold>), EmbeddingError> {
+        for _ in 0..SETTLING {
+            let net = self.settled();
+            self.state = self.solve(net, progress)?;
+        }
+        self.roads.hold_all();
+        let net = self.state.net.clone();
+        self.state = self.solve(net, progress)?;
+        let State { net, metric, field, objective, solution } = &mut self.state;
+        let Some(system) = &self.seamless else { return Ok((self.state, Vec::new())) };
+        let mut quarters = vec![4; net.mesh.n_vertices()];
+        for v in net.mesh.vertices().filter(|&v| net.mesh.is_boundary_vertex(v)) {
+            quarters[v.index()] = 0;
+        }
+        for n in net.nodes.iter().filter(|n| !n.boundary) {
+            quarters[n.vertex.index()] = n.valence as u32;
+        }
+        let unfolded = system.unfold(&net.mesh, metric, field, objective, &quarters, &solution.free, progress)?;
+        tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
+        solution.map = system.map(&unfolded.y);
+        solution.energy = unfolded.energy;
+        solution.free = unfolded.y;
+        Ok((self.state, unfolded.folds))
+    }
+
+    /// Field and map of a net, with the field at hand as the one before.
+    fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
+        let metric = Metric::new(&net.mesh);
+        let mut solver = Solver {
+            curvature: &self.curvature,
+            sharp: &self.sharp,
+            roads: &self.roads,
+            guided: &self.guided,
+            seamless: self.seamless.take(),
+            sizes: self.sizes.take(),
+            settings: self.settings,
+        };
+        let next = solver.solve(net, metric, Some(&self.state.field.angle), progress);
+        (self.seamless, self.sizes) = (solver.seamless, solver.sizes);
+        next
+    }
+
+    /// The net with regular nodes, and only these, brought to the crossings of their isolines.
+    fn settled(&self) -> Net {
+        let mut moved = self.state.net.clone();
+        let cell = self.cells();
+        for i in 0..moved.nodes.len() {
+            if !self.roads.held[i] {
+                self.cross(&mut moved, i, &cell);
+            }
+        }
+        moved
+    }
+
+    fn cells(&self) -> Vec<u32> {
+        let net = &self.state.net;
+        voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>())
     }
 }
 
@@ -453,7 +495,7 @@ fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<bool> {
         .collect()
 }
 
-fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: &[bool]) -> Ground<'a> {
+fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: impl Fn(usize) -> bool) -> Ground<'a> {
     let mesh = &net.mesh;
     let curve: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] || mesh.is_boundary_edge(e)).collect();
     let mut degree = vec![0; mesh.n_vertices()];
@@ -467,7 +509,7 @@ fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: &[bool])
         .iter()
         .enumerate()
         .map(|(i, n)| match degree[n.vertex.index()] {
-            _ if pinned.get(i).copied().unwrap_or(false) => Hold::Fixed,
+            _ if pinned(i) => Hold::Fixed,
             0 => Hold::Free,
             2 if !turns(mesh, &curve, n.vertex) => Hold::Curve,
             _ => Hold::Fixed,

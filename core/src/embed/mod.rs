@@ -17,6 +17,7 @@ mod march;
 mod measures;
 mod net;
 mod patches;
+mod pipeline;
 mod relocate;
 mod rose;
 mod shift;
@@ -39,6 +40,7 @@ pub use guides::{feature_guides, shape_guides};
 pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use net::{Headings, Net, NetArc, NetNode, headings};
 pub use patches::{RectangleError, map_rectangles};
+pub use pipeline::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Snapshot, optimise};
 pub use relocate::Hold;
 pub use sizing::{SizingSystem, rest_turns};
 pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
@@ -83,6 +85,12 @@ pub enum EmbeddingError {
     /// The mesh with the nodes inserted is not a manifold.
     #[error("the layout's nodes do not fit into the mesh: {0}")]
     Mesh(#[from] TriMeshError),
+    /// The arcs could not be traced in the map.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    /// The patches are not the rectangles the layout says.
+    #[error(transparent)]
+    Rectangle(#[from] RectangleError),
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

@@ -243,16 +243,17 @@ impl Charts {
                 n = next(drawing.twin(n)?);
             }
         }
-        let [first, last] = if backward { [arc.nodes[1], arc.nodes[0]] } else { arc.nodes };
+        let corner = |h: u32, node: u32| working.corner(h / 3, working.nodes[node as usize]);
+        let heading = |h: u32| Some((self.heading(h)? + self.frame[h as usize / 3]).rem_euclid(4) as u8);
         let (head, tail) = (halfedges[0], halfedges[halfedges.len() - 1]);
-        let heading = (self.heading(head)? + self.frame[head as usize / 3]).rem_euclid(4) as u8;
-        Some(NetArc {
-            nodes: [first, last],
-            start: working.corner(head / 3, working.nodes[first as usize])?,
-            crossed,
-            end: working.corner(tail / 3, working.nodes[last as usize])?,
-            heading,
-            boundary: arc.boundary,
+        let (boundary, nodes) = (arc.boundary, arc.nodes);
+        Some(if backward {
+            let crossed = crossed.iter().rev().map(|&h| working.mesh.twin(h)).collect::<Option<_>>()?;
+            let (start, end) = (corner(tail, nodes[0])?, corner(head, nodes[1])?);
+            NetArc { nodes, start, crossed, end, heading: (heading(tail)? + 2) % 4, boundary }
+        } else {
+            let (start, end) = (corner(head, nodes[0])?, corner(tail, nodes[1])?);
+            NetArc { nodes, start, crossed, end, heading: heading(head)?, boundary }
         })
     }
 

@@ -65,7 +65,7 @@ impl Objective {
     }
 
     /// The lengths wanted in a triangle.
-    fn target(&self, f: FaceId) -> [f64; 2] {
+    pub(super) fn target(&self, f: FaceId) -> [f64; 2] {
         self.lengths.get(f.index()).copied().unwrap_or([1.0; 2])
     }
 

@@ -13,6 +13,7 @@ use super::constraints;
 use super::cut::Cut;
 use super::objective::{Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
+use super::unfold::{OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
 use crate::field::{CrossField, Metric};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
@@ -243,6 +244,41 @@ impl SeamlessSystem {
         let face_energy: Vec<f64> = each.iter().map(|r| r.energy).collect();
         let energy = face_energy.iter().sum();
         Ok(Solution { map, free, face_energy, energy, matrix, rhs, factor })
+    }
+
+    /// Removes the folds of the map with free variables `y`; see [`unfold`](super::unfold). `quarters` tells the angle
+    /// around every vertex in the map, in quarter turns; 0 where it is open, as on the boundary.
+    ///
+    /// # Errors
+    ///
+    /// [`ParamError::WrongLength`] or [`ParamError::Cancelled`].
+    pub fn unfold(
+        &self,
+        mesh: &TriMesh,
+        metric: &Metric,
+        field: &CrossField,
+        objective: &Objective,
+        quarters: &[u32],
+        y: &[f64],
+        progress: &Progress,
+    ) -> Result<Unfolded, ParamError> {
+        expect_length("the list of angles around vertices", quarters.len(), mesh.n_vertices())?;
+        expect_length("the list of free variables", y.len(), self.n_free())?;
+        let triangle = |f: FaceId| {
+            let [a, b] = objective.target(f);
+            OrientedTriangle {
+                layout: *metric.layout(f),
+                axis: DVec2::from_angle(field.angle[f.index()]),
+                lengths: DVec2::new(a, b),
+                weight: metric.area(f),
+                ratio: objective.anisotropy,
+                vertices: mesh.face_vertices(f).map(|v| v.0),
+                corners: mesh.face_halfedges(f).map(|h| [0, 1].map(|axis| constraints::corner(&self.cut, h, axis))),
+            }
+        };
+        let triangles: Vec<OrientedTriangle> = mesh.faces().map(triangle).collect();
+        let problem = OrientationProblem { triangles: &triangles, reduction: &self.tied.reduction, quarters };
+        Ok(unfold(&problem, y, progress)?)
     }
 
     /// The map where the free variables are `y`.

@@ -169,8 +169,8 @@ fn line_fragment(in: LineVarying) -> @location(0) vec4f {
 struct Marker {
     @location(0) position: vec3f,
     @location(1) color: vec4f,
-    // Radius in points; how much of the colour hidden markers keep.
-    @location(2) style: vec2f,
+    // Radius in points; how much of the colour hidden markers keep; 1 for a square with a pale core, else 0.
+    @location(2) style: vec3f,
 }
 
 struct MarkerVarying {
@@ -178,7 +178,7 @@ struct MarkerVarying {
     @location(0) offset: vec2f,
     @location(1) @interpolate(flat) centre: vec3f,
     @location(2) @interpolate(flat) color: vec4f,
-    @location(3) @interpolate(flat) style: vec2f,
+    @location(3) @interpolate(flat) style: vec3f,
 }
 
 @vertex
@@ -202,11 +202,14 @@ fn marker_vertex(in: Marker, @builtin(vertex_index) index: u32) -> MarkerVarying
 @fragment
 fn marker_fragment(in: MarkerVarying) -> @location(0) vec4f {
     let radius = in.style.x * view.toggles.w;
-    let distance = length(in.offset);
+    let round = length(in.offset);
+    let square = in.style.z > 0.5;
+    let distance = select(round, max(abs(in.offset.x), abs(in.offset.y)), square);
     let outer = clamp(radius + 0.5 - distance, 0.0, 1.0);
     // A pale ring keeps the disc apart from the lines that meet in it.
     let inner = clamp(radius - 1.25 * view.toggles.w + 0.5 - distance, 0.0, 1.0);
-    let rgb = mix(vec3f(1.0), in.color.rgb, inner);
+    let core = select(0.0, clamp(0.34 * radius + 0.5 - round, 0.0, 1.0), square);
+    let rgb = mix(vec3f(1.0), in.color.rgb, inner * (1.0 - core));
     let alpha = in.color.a * outer * mix(in.style.y, 1.0, visible(in.centre.xy, in.centre.z));
     return vec4f(rgb * alpha, alpha);
 }

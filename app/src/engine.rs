@@ -3,6 +3,7 @@
 //! The window and the worker know only this. An engine is opened by an [`Opener`], owned by the worker thread and
 //! never touched by the window, which reads the immutable [`Scene`] snapshots.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -148,6 +149,15 @@ pub trait Engine: Send {
     fn set_visible(&mut self, strip: StripId, visible: bool) -> Result<(), EngineError>;
     /// The strip that helps most now; not yet placed.
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
+    /// Pins a part of the layout where it is, or lets it go; no change of the strips.
+    fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError>;
+    /// Optimises the embedding of the layout. Every improvement is handed to `watch`, which may break off: the best so
+    /// far is then finished and kept. The result is forgotten when the strips change.
+    fn optimise(
+        &mut self,
+        watch: &mut dyn FnMut(EmbeddingStep) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<(), EngineError>;
     /// What is to be shown now.
     fn scene(&self) -> Arc<Scene>;
     /// Adds to the scene something that takes long and may come later, such as stripes or the layout; returns whether
@@ -185,6 +195,8 @@ pub struct Scene {
     pub exportable: bool,
     /// The layout, once it is valid.
     pub layout: Option<Arc<LayoutPreview>>,
+    /// What was optimised, if the layout shown is.
+    pub embedding: Option<Arc<EmbeddingSummary>>,
     /// Whether there is a change to take back.
     pub can_undo: bool,
     /// Whether there is one to make again.
@@ -211,6 +223,8 @@ pub struct DisplaySurface {
     pub faces: Vec<[u32; 3]>,
     /// Normals at the corners of each face.
     pub normals: Vec<[DVec3; 3]>,
+    /// The triangle of the design mesh that each face lies in.
+    pub base: Vec<u32>,
     /// The colour of the region of each face; empty when there are no regions yet.
     pub regions: Vec<RegionColor>,
     /// The stripe pattern of each face along both families; empty when there is no strip map.
@@ -266,13 +280,48 @@ pub struct Remark {
     pub place: Option<DVec3>,
 }
 
+/// A part of a layout that can be pinned, by its place in [`LayoutPreview`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LayoutPart {
+    /// A node.
+    Node(usize),
+    /// An arc.
+    Arc(usize),
+}
+
 /// The layout in space.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LayoutPreview {
     /// Arcs, each from node to node.
-    pub arcs: Vec<Vec<DVec3>>,
-    /// Nodes with their valence and whether they lie on the boundary.
+    pub arcs: Vec<LayoutArc>,
+    /// Nodes.
     pub nodes: Vec<LayoutNode>,
+}
+
+impl LayoutPreview {
+    /// Whether a part is pinned; `None` where there is no such part.
+    pub fn is_pinned(&self, part: LayoutPart) -> Option<bool> {
+        match part {
+            LayoutPart::Node(i) => self.nodes.get(i).map(|n| n.pinned),
+            LayoutPart::Arc(i) => self.arcs.get(i).map(|a| a.pinned),
+        }
+    }
+
+    /// The pinned nodes, then the pinned arcs.
+    pub fn pinned(&self) -> Vec<LayoutPart> {
+        let nodes = (0..self.nodes.len()).map(LayoutPart::Node);
+        let parts = nodes.chain((0..self.arcs.len()).map(LayoutPart::Arc));
+        parts.filter(|&p| self.is_pinned(p) == Some(true)).collect()
+    }
+}
+
+/// An arc of the layout.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LayoutArc {
+    /// From node to node; empty while it cannot be drawn.
+    pub points: Vec<DVec3>,
+    /// Whether it is to stay where it is.
+    pub pinned: bool,
 }
 
 /// A node of the layout.
@@ -284,4 +333,55 @@ pub struct LayoutNode {
     pub valence: u32,
     /// Whether the valence is other than 4 inside, 3 on the boundary.
     pub irregular: bool,
+    /// Whether it is to stay where it is.
+    pub pinned: bool,
+}
+
+/// An embedding on its way.
+#[derive(Debug, Clone)]
+pub struct EmbeddingStep {
+    /// Steps made so far.
+    pub step: usize,
+    /// The energy as a fraction of that at the start.
+    pub energy: f64,
+    /// Triangles that the map turns over.
+    pub flipped: usize,
+    /// The layout as it is now.
+    pub layout: LayoutPreview,
+}
+
+/// An optimised embedding in figures.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EmbeddingSummary {
+    /// Steps made.
+    pub steps: usize,
+    /// Energy over the area of the surface, at the start and in the end.
+    pub energy: [f64; 2],
+    /// Triangles turned over at the start and in the end.
+    pub flipped: [usize; 2],
+    /// Mean conformal distortion of the patches' maps, 2 at best.
+    pub conformal: f64,
+    /// Mean deviation of the patches' isolines from principal directions, in degrees.
+    pub alignment: f64,
+    /// How far quads along the isolines are from flat, 0 at best.
+    pub planar: f64,
+    /// Longer over shorter side of the most oblong patch, and its middle.
+    pub aspect: (f64, DVec3),
+    /// What could not be unfolded, in words.
+    pub folds: Vec<Remark>,
+    /// What the maps do to each triangle of the design mesh.
+    pub triangles: Vec<TriangleDistortion>,
+}
+
+/// What the maps of the patches do to one triangle of the design mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriangleDistortion {
+    /// Mean conformal distortion, 2 at best.
+    pub conformal: f64,
+    /// Mean deviation from principal directions, in degrees, 0 to 45.
+    pub deviation: f64,
+    /// How pronounced the principal directions are, from 0 (not at all) to 1.
+    pub anisotropy: f64,
+    /// Whether some part of it is turned over.
+    pub flipped: bool,
 }

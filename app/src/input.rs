@@ -1,6 +1,6 @@
 //! From what the pointer does over the 3D view to what the user means by it.
 //!
-//! A small state machine without a window. Left click places; left or middle drag orbits; right drag or middle drag
+//! A small state machine without a window. Left click places, or pins a part of the layout; left or middle drag orbits; right drag or middle drag
 //! with Shift pans; the wheel browses over the surface and zooms over the background or with Ctrl. Positions in
 //! points from the view's top left corner.
 
@@ -52,6 +52,17 @@ pub enum PointerEvent {
     Pinch(f32),
 }
 
+/// What the pointer is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Under {
+    /// Nothing.
+    Background,
+    /// The surface.
+    Surface,
+    /// A node or an arc of the layout that can be pinned.
+    Part,
+}
+
 /// What the user means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Intent {
@@ -63,6 +74,8 @@ pub enum Intent {
     Browse(i32),
     /// Take what is shown here.
     Place(Vec2),
+    /// Pin what is here, or let it go.
+    Pin(Vec2),
     /// Turn the view by a drag.
     Orbit(Vec2),
     /// Move the view by a drag.
@@ -110,8 +123,8 @@ impl Input {
         self.position
     }
 
-    /// Takes in one event; `over_surface` tells whether the pointer is over the surface now.
-    pub fn handle(&mut self, event: PointerEvent, over_surface: bool) -> Option<Intent> {
+    /// Takes in one event; `under` tells what the pointer is over now.
+    pub fn handle(&mut self, event: PointerEvent, under: Under) -> Option<Intent> {
         match event {
             PointerEvent::Moved(to) => self.moved(to),
             PointerEvent::Gone => {
@@ -127,9 +140,9 @@ impl Input {
                 self.drag = Drag::Pending { button, from: at, pan };
                 None
             }
-            PointerEvent::Released(button, at) => self.released(button, at, over_surface),
-            PointerEvent::Wheel(notches, held) => self.turned(notches, held, over_surface),
-            PointerEvent::Scroll(points, held) => self.turned(points / POINTS_PER_NOTCH, held, over_surface),
+            PointerEvent::Released(button, at) => self.released(button, at, under),
+            PointerEvent::Wheel(notches, held) => self.turned(notches, held, under),
+            PointerEvent::Scroll(points, held) => self.turned(points / POINTS_PER_NOTCH, held, under),
             PointerEvent::Pinch(factor) => Some(Intent::Zoom(1.0 / factor.clamp(0.1, 10.0), self.position?)),
         }
     }
@@ -152,7 +165,7 @@ impl Input {
         }
     }
 
-    fn released(&mut self, button: Button, at: Vec2, over_surface: bool) -> Option<Intent> {
+    fn released(&mut self, button: Button, at: Vec2, under: Under) -> Option<Intent> {
         let held = match self.drag {
             Drag::None => return None,
             Drag::Pending { button, .. } | Drag::Orbit(button) | Drag::Pan(button) => button,
@@ -162,12 +175,16 @@ impl Input {
         }
         let click = matches!(self.drag, Drag::Pending { button: Button::Primary, .. });
         self.drag = Drag::None;
-        if click && over_surface { Some(Intent::Place(at)) } else { Some(Intent::Hover(at)) }
+        Some(match under {
+            Under::Surface if click => Intent::Place(at),
+            Under::Part if click => Intent::Pin(at),
+            _ => Intent::Hover(at),
+        })
     }
 
-    fn turned(&mut self, notches: f32, held: Held, over_surface: bool) -> Option<Intent> {
+    fn turned(&mut self, notches: f32, held: Held, under: Under) -> Option<Intent> {
         let at = self.position?;
-        if held.ctrl || !over_surface || self.is_dragging() {
+        if held.ctrl || under == Under::Background || self.is_dragging() {
             self.scrolled = 0.0;
             return Some(Intent::Zoom(ZOOM_PER_NOTCH.powf(notches.clamp(-8.0, 8.0)), at));
         }
@@ -188,7 +205,7 @@ mod tests {
 
     fn at_rest() -> Input {
         let mut input = Input::default();
-        assert_eq!(input.handle(PointerEvent::Moved(HERE), true), Some(Intent::Hover(HERE)));
+        assert_eq!(input.handle(PointerEvent::Moved(HERE), Under::Surface), Some(Intent::Hover(HERE)));
         input
     }
 
@@ -196,21 +213,25 @@ mod tests {
         let mut input = at_rest();
         let there = HERE + Vec2::new(10.0, 0.0);
         [
-            input.handle(PointerEvent::Pressed(button, HERE, held), true),
-            input.handle(PointerEvent::Moved(there), true),
-            input.handle(PointerEvent::Moved(there + Vec2::Y), true),
-            input.handle(PointerEvent::Released(button, there + Vec2::Y), true),
+            input.handle(PointerEvent::Pressed(button, HERE, held), Under::Surface),
+            input.handle(PointerEvent::Moved(there), Under::Surface),
+            input.handle(PointerEvent::Moved(there + Vec2::Y), Under::Surface),
+            input.handle(PointerEvent::Released(button, there + Vec2::Y), Under::Surface),
         ]
     }
 
     #[test]
-    fn a_steady_click_places_on_the_surface_only() {
-        for over in [true, false] {
+    fn a_steady_click_places_on_the_surface_and_pins_parts_of_the_layout() {
+        for over in [Under::Surface, Under::Background, Under::Part] {
             let mut input = at_rest();
             assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), over), None);
             let near = HERE + Vec2::new(2.0, 1.0);
             assert_eq!(input.handle(PointerEvent::Moved(near), over), None);
-            let expected = if over { Intent::Place(near) } else { Intent::Hover(near) };
+            let expected = match over {
+                Under::Surface => Intent::Place(near),
+                Under::Part => Intent::Pin(near),
+                Under::Background => Intent::Hover(near),
+            };
             assert_eq!(input.handle(PointerEvent::Released(Button::Primary, near), over), Some(expected));
             assert!(!input.is_dragging());
         }
@@ -231,10 +252,10 @@ mod tests {
     #[test]
     fn the_wheel_browses_over_the_surface_and_zooms_elsewhere() {
         let mut input = at_rest();
-        assert_eq!(input.handle(PointerEvent::Wheel(-1.0, FREE), true), Some(Intent::Browse(1)));
-        assert_eq!(input.handle(PointerEvent::Wheel(2.0, FREE), true), Some(Intent::Browse(-2)));
+        assert_eq!(input.handle(PointerEvent::Wheel(-1.0, FREE), Under::Surface), Some(Intent::Browse(1)));
+        assert_eq!(input.handle(PointerEvent::Wheel(2.0, FREE), Under::Surface), Some(Intent::Browse(-2)));
         let ctrl = Held { shift: false, ctrl: true };
-        for (held, over) in [(ctrl, true), (FREE, false)] {
+        for (held, over) in [(ctrl, Under::Surface), (FREE, Under::Background)] {
             let zoom = input.handle(PointerEvent::Wheel(1.0, held), over);
             assert!(matches!(zoom, Some(Intent::Zoom(f, at)) if f < 1.0 && at == HERE), "{zoom:?}");
         }
@@ -244,29 +265,29 @@ mod tests {
     fn a_touchpad_browses_one_notch_at_a_time() {
         let mut input = at_rest();
         let scroll = PointerEvent::Scroll(-POINTS_PER_NOTCH * 0.4, FREE);
-        assert_eq!(input.handle(scroll, true), None);
-        assert_eq!(input.handle(scroll, true), None);
-        assert_eq!(input.handle(scroll, true), Some(Intent::Browse(1)));
-        assert_eq!(input.handle(scroll, true), None);
+        assert_eq!(input.handle(scroll, Under::Surface), None);
+        assert_eq!(input.handle(scroll, Under::Surface), None);
+        assert_eq!(input.handle(scroll, Under::Surface), Some(Intent::Browse(1)));
+        assert_eq!(input.handle(scroll, Under::Surface), None);
     }
 
     #[test]
     fn another_button_does_not_end_a_drag() {
         let mut input = at_rest();
-        input.handle(PointerEvent::Pressed(Button::Middle, HERE, FREE), true);
-        input.handle(PointerEvent::Moved(HERE * 2.0), true);
-        assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE * 2.0, FREE), true), None);
-        assert_eq!(input.handle(PointerEvent::Released(Button::Primary, HERE * 2.0), true), None);
+        input.handle(PointerEvent::Pressed(Button::Middle, HERE, FREE), Under::Surface);
+        input.handle(PointerEvent::Moved(HERE * 2.0), Under::Surface);
+        assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE * 2.0, FREE), Under::Surface), None);
+        assert_eq!(input.handle(PointerEvent::Released(Button::Primary, HERE * 2.0), Under::Surface), None);
         assert!(input.is_dragging());
     }
 
     #[test]
     fn leaving_hides_the_proposal_but_not_during_a_drag() {
         let mut input = at_rest();
-        assert_eq!(input.handle(PointerEvent::Gone, false), Some(Intent::Leave));
-        assert_eq!(input.handle(PointerEvent::Wheel(1.0, FREE), false), None);
+        assert_eq!(input.handle(PointerEvent::Gone, Under::Background), Some(Intent::Leave));
+        assert_eq!(input.handle(PointerEvent::Wheel(1.0, FREE), Under::Background), None);
         let mut input = at_rest();
-        input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), true);
-        assert_eq!(input.handle(PointerEvent::Gone, false), None);
+        input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), Under::Surface);
+        assert_eq!(input.handle(PointerEvent::Gone, Under::Background), None);
     }
 }

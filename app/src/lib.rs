@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod cli;
+pub mod distortion;
 pub mod engine;
 pub mod input;
 pub mod render;

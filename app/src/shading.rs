@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::engine::{DisplaySurface, LayoutPreview, Proposal, RegionColor, Scene, StripId};
+use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColor, Scene, StripId};
 use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
 
 /// Placed strips.
@@ -15,6 +15,8 @@ pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
 pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
 /// Arcs of the layout.
 pub const ARC: [u8; 4] = [0x24, 0x26, 0x2a, 0xff];
+/// Inside of a pinned arc.
+const CORE: [u8; 4] = [0xff, 0xff, 0xff, 0xff];
 /// Regular nodes of the layout.
 pub const NODE: [u8; 4] = [0x5a, 0x5e, 0x66, 0xff];
 /// Irregular nodes of valence below and above the regular one.
@@ -43,11 +45,16 @@ fn tint(color: RegionColor) -> [u8; 4] {
     }
 }
 
-/// The surface as triangles.
-pub fn surface(display: &DisplaySurface) -> SurfaceMesh {
+/// The surface as triangles, in the colours of its regions or those given for the triangles of the design mesh.
+pub fn surface(display: &DisplaySurface, tints: Option<&[[u8; 4]]>) -> SurfaceMesh {
     let mut vertices = Vec::with_capacity(display.faces.len() * 3);
+    let region = |f: usize| display.regions.get(f).map(|&c| tint(c));
     for (f, face) in display.faces.iter().enumerate() {
-        let tint = display.regions.get(f).map_or([0; 4], |&c| tint(c));
+        let tint = match tints {
+            Some(tints) => display.base.get(f).and_then(|&b| tints.get(b as usize).copied()),
+            None => region(f),
+        };
+        let tint = tint.unwrap_or_default();
         let stripes = display.stripes.get(f).copied().unwrap_or_default();
         for corner in 0..3 {
             let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
@@ -114,8 +121,10 @@ pub struct Overlay<'a> {
     pub proposal: Option<&'a Proposal>,
     /// The strip selected in the list.
     pub selected: Option<StripId>,
-    /// Whether arcs and nodes are shown where there are some.
-    pub layout: bool,
+    /// Arcs and nodes.
+    pub layout: Option<&'a LayoutPreview>,
+    /// Of these, what a click would pin or let go.
+    pub part: Option<LayoutPart>,
     /// Whether placed strips are shown.
     pub strips: bool,
     /// A place that a message speaks of.
@@ -126,7 +135,7 @@ pub struct Overlay<'a> {
 pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     let mut lines = Vec::new();
     let mut markers = Vec::new();
-    let layout = o.scene.layout.as_deref().filter(|_| o.layout);
+    let layout = o.layout;
     if o.strips {
         for strip in o.scene.strips.iter().filter(|s| s.visible) {
             let selected = o.selected == Some(strip.id);
@@ -142,28 +151,45 @@ pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
         }
     }
     if let Some(layout) = layout {
-        draw_layout(layout, &mut lines, &mut markers);
+        draw_layout(layout, o.part, &mut lines, &mut markers);
     }
     if let Some(proposal) = o.proposal {
         seamed(&mut lines, points(&proposal.polyline), proposal.curve.closed, PROPOSED, 3.6);
     }
     if let Some(place) = o.place {
         let position = place.as_vec3().to_array();
-        markers.push(Marker { position, color: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5 });
+        markers.push(Marker { position, color: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5, square: false });
     }
     (lines, markers)
 }
 
-fn draw_layout(layout: &LayoutPreview, lines: &mut Vec<Polyline>, markers: &mut Vec<Marker>) {
-    for arc in &layout.arcs {
-        lines.push(Polyline { points: points(arc), closed: false, color: ARC, width: 2.2, hidden: 0.10 });
+fn draw_layout(layout: &LayoutPreview, part: Option<LayoutPart>, lines: &mut Vec<Polyline>, markers: &mut Vec<Marker>) {
+    let line =
+        |arc: &[DVec3], color, width, hidden| Polyline { points: points(arc), closed: false, color, width, hidden };
+    if let Some(LayoutPart::Arc(i)) = part
+        && let Some(arc) = layout.arcs.get(i)
+    {
+        lines.push(line(&arc.points, PROPOSED, 8.0, 0.0));
     }
-    for node in &layout.nodes {
-        let (color, radius) = match (node.irregular, node.valence < 4) {
+    for arc in layout.arcs.iter().filter(|a| a.points.len() > 1) {
+        lines.push(line(&arc.points, ARC, if arc.pinned { 5.4 } else { 2.2 }, 0.10));
+        if arc.pinned {
+            lines.push(line(&arc.points, CORE, 2.0, 0.0));
+        }
+    }
+    for (i, node) in layout.nodes.iter().enumerate() {
+        let (color, radius): (_, f32) = match (node.irregular, node.valence < 4) {
             (false, _) => (NODE, 3.4),
             (true, low) => (IRREGULAR[usize::from(!low)], 5.6),
         };
-        markers.push(Marker { position: node.position.as_vec3().to_array(), color, radius, hidden: 0.12 });
+        let position = node.position.as_vec3().to_array();
+        // Large enough for the square's core to be seen.
+        let radius = if node.pinned { radius.max(5.6) } else { radius };
+        let marker = Marker { position, color, radius, hidden: 0.12, square: node.pinned };
+        if part == Some(LayoutPart::Node(i)) {
+            markers.push(Marker { color: PROPOSED, radius: radius + 4.0, ..marker.clone() });
+        }
+        markers.push(marker);
     }
 }
 

@@ -1,11 +1,14 @@
 //! The worker: a thread that owns the engine, so that the window never waits.
 //!
 //! Requests that change something are queued and done in order. Of hover requests only the latest counts: a newer
-//! one, or any change, cancels the one being worked on. Opening cancels everything. Every reply wakes the window.
+//! one, or any change, cancels the one being worked on. An optimisation of the embedding hands out what it has so far, may
+//! be stopped, and is dropped by any change of the strips. Opening cancels everything. Every reply wakes the window.
 
 use std::collections::VecDeque;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,7 +16,10 @@ use std::time::{Duration, Instant};
 use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
 
-use crate::engine::{Engine, EngineError, ExportOptions, ExportReport, Opener, Proposal, Scene, Source, StripId};
+use crate::engine::{
+    EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, Opener, Proposal, Scene, Source,
+    StripId,
+};
 
 /// Something to be done, in order.
 #[derive(Debug, Clone)]
@@ -32,6 +38,10 @@ pub enum Job {
     Redo,
     /// Find the strip that helps most and place it.
     Suggest,
+    /// Pin a part of the layout, or let it go.
+    SetPinned(LayoutPart, bool),
+    /// Optimise the embedding of the layout.
+    Optimise,
     /// Write the design.
     Save(PathBuf),
     /// Write the finished layout into a folder.
@@ -49,9 +59,16 @@ impl Job {
             Self::Undo => "Undoing".into(),
             Self::Redo => "Redoing".into(),
             Self::Suggest => "Looking for the strip that helps most".into(),
+            Self::SetPinned(..) => "Pinning".into(),
+            Self::Optimise => "Optimising the embedding".into(),
             Self::Save(_) => "Saving the design".into(),
             Self::Export(..) => "Exporting the layout".into(),
         }
+    }
+
+    /// Whether it makes any work on the present layout useless.
+    fn changes_strips(&self) -> bool {
+        matches!(self, Self::Open(_) | Self::Place(_) | Self::Remove(_) | Self::Undo | Self::Redo | Self::Suggest)
     }
 }
 
@@ -78,6 +95,10 @@ pub enum Reply {
         /// Whether this is all.
         complete: bool,
     },
+    /// The embedding became better; more may follow.
+    Improved(EmbeddingStep),
+    /// The embedding was optimised.
+    Optimised(Arc<Scene>),
     /// The design was written.
     Saved(PathBuf),
     /// The layout was written.
@@ -102,6 +123,8 @@ pub struct Running {
     pub progress: Arc<Progress>,
     /// Whether anything else goes before it: a hover request, or what was left for later.
     pub yields: bool,
+    /// Of an optimisation: to be set in order to stop it and keep the best so far.
+    pub stop: Option<Arc<AtomicBool>>,
 }
 
 #[derive(Default)]
@@ -161,7 +184,8 @@ impl Worker {
         if open {
             state.jobs.clear();
         }
-        if let Some(running) = state.running.as_ref().filter(|r| r.yields || open) {
+        let useless = |r: &&Running| r.yields || open || (r.stop.is_some() && job.changes_strips());
+        if let Some(running) = state.running.as_ref().filter(useless) {
             running.progress.cancel();
         }
         state.jobs.push_back(job);
@@ -192,6 +216,13 @@ impl Worker {
         state.hover = None;
         if let Some(running) = &state.running {
             running.progress.cancel();
+        }
+    }
+
+    /// Stops an optimisation: the best so far is finished and kept.
+    pub fn stop(&self) {
+        if let Some(stop) = self.shared.lock().running.as_ref().and_then(|r| r.stop.as_ref()) {
+            stop.store(true, Ordering::Relaxed);
         }
     }
 
@@ -259,12 +290,11 @@ struct Loop {
 
 impl Loop {
     fn run(mut self) {
-        while let Some((task, progress)) = self.next() {
-            let label = task.label();
-            let yields = !matches!(task, Task::Job(_));
+        while let Some((task, running)) = self.next() {
+            let Running { label, yields, .. } = running.clone();
             let changes = !matches!(task, Task::Hover(..) | Task::Complete);
             // A bug in the engine must cost one operation, not the user's session.
-            let result = catch_unwind(AssertUnwindSafe(|| self.work(task, &progress)))
+            let result = catch_unwind(AssertUnwindSafe(|| self.work(task, &running)))
                 .unwrap_or_else(|_| Err(EngineError::failed("an internal error; the design is as it was before")));
             {
                 let mut state = self.shared.lock();
@@ -281,7 +311,7 @@ impl Loop {
     }
 
     /// Waits for the next task.
-    fn next(&self) -> Option<(Task, Arc<Progress>)> {
+    fn next(&self) -> Option<(Task, Running)> {
         let mut state = self.shared.lock();
         loop {
             if state.closed {
@@ -293,18 +323,24 @@ impl Loop {
             };
             let task = task.or_else(|| std::mem::take(&mut state.incomplete).then_some(Task::Complete));
             if let Some(task) = task {
-                let progress = Arc::new(Progress::new());
-                let (label, yields) = (task.label(), !matches!(task, Task::Job(_)));
-                state.running = Some(Running { label, since: Instant::now(), progress: Arc::clone(&progress), yields });
+                let running = Running {
+                    label: task.label(),
+                    since: Instant::now(),
+                    progress: Arc::default(),
+                    yields: !matches!(task, Task::Job(_)),
+                    stop: matches!(task, Task::Job(Job::Optimise)).then(Arc::default),
+                };
+                state.running = Some(running.clone());
                 drop(state);
                 (self.notify)();
-                return Some((task, progress));
+                return Some((task, running));
             }
             state = self.shared.wake.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    fn work(&mut self, task: Task, progress: &Progress) -> Result<Option<Reply>, EngineError> {
+    fn work(&mut self, task: Task, running: &Running) -> Result<Option<Reply>, EngineError> {
+        let progress = &*running.progress;
         let job = match task {
             Task::Job(Job::Open(source)) => return self.open(source, progress).map(Some),
             Task::Job(job) => job,
@@ -338,6 +374,17 @@ impl Loop {
                 let proposal = engine.suggest(progress)?;
                 engine.place(&proposal, progress)?;
             }
+            Job::SetPinned(part, pinned) => engine.set_pinned(part, pinned)?,
+            Job::Optimise => {
+                let stopped = || running.stop.as_ref().is_some_and(|s| s.load(Ordering::Relaxed));
+                let mut watch = |step| {
+                    drop(self.sender.send(Reply::Improved(step)));
+                    (self.notify)();
+                    if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
+                engine.optimise(&mut watch, progress)?;
+                return Ok(Some(Reply::Optimised(engine.scene())));
+            }
             Job::Save(path) => {
                 engine.save(&path)?;
                 return Ok(Some(Reply::Saved(path)));
@@ -361,14 +408,14 @@ impl Loop {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::BuiltIn;
+    use crate::engine::{BuiltIn, LayoutPreview};
     use glam::DVec3;
     use plait_core::mesh::{FaceId, TriMesh};
     use plait_core::surface::{SurfaceCurve, SurfaceIndex};
     use std::path::Path;
 
     /// An engine whose answers carry the face they were asked for as their cost. Undo waits to be cancelled, redo
-    /// panics.
+    /// panics, optimising goes on until it is stopped.
     struct Fake(Arc<Scene>);
 
     struct FakeOpener;
@@ -391,6 +438,7 @@ mod tests {
                 summary: String::new(),
                 exportable: false,
                 layout: None,
+                embedding: None,
                 can_undo: false,
                 can_redo: false,
             }))))
@@ -435,6 +483,24 @@ mod tests {
         }
         fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
             Err(EngineError::failed("nothing helps"))
+        }
+        fn set_pinned(&mut self, _: LayoutPart, _: bool) -> Result<(), EngineError> {
+            Ok(())
+        }
+        fn optimise(
+            &mut self,
+            watch: &mut dyn FnMut(EmbeddingStep) -> ControlFlow<()>,
+            progress: &Progress,
+        ) -> Result<(), EngineError> {
+            for step in 0.. {
+                progress.check()?;
+                let layout = LayoutPreview::default();
+                if watch(EmbeddingStep { step, energy: 1.0, flipped: 0, layout }).is_break() {
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            Ok(())
         }
         fn scene(&self) -> Arc<Scene> {
             Arc::clone(&self.0)
@@ -513,6 +579,50 @@ mod tests {
         worker.request(Job::Suggest);
         let Reply::Failed { error, .. } = reply(&worker) else { panic!("not a failure") };
         assert_eq!(error.to_string(), "nothing helps");
+    }
+
+    /// The first reply after the steps of an optimisation, and how many those were.
+    fn after_steps(worker: &Worker) -> (usize, Reply) {
+        let mut steps = 0;
+        loop {
+            match reply(worker) {
+                Reply::Improved(_) => steps += 1,
+                other => return (steps, other),
+            }
+        }
+    }
+
+    #[test]
+    fn a_stopped_optimisation_is_kept_and_a_cancelled_one_is_not() {
+        let worker = worker();
+        worker.request(Job::Optimise);
+        running(&worker, "Optimising the embedding");
+        worker.stop();
+        let (steps, last) = after_steps(&worker);
+        assert!(steps > 0 && matches!(last, Reply::Optimised(_)), "{last:?}");
+        worker.request(Job::Optimise);
+        running(&worker, "Optimising the embedding");
+        worker.cancel();
+        let (_, last) = after_steps(&worker);
+        assert!(matches!(last, Reply::Failed { error: EngineError::Cancelled, .. }), "{last:?}");
+    }
+
+    #[test]
+    fn changes_of_the_strips_drop_an_optimisation_and_others_wait_for_it() {
+        let worker = worker();
+        worker.request(Job::Optimise);
+        running(&worker, "Optimising the embedding");
+        worker.request(Job::Remove(StripId(0)));
+        let (_, last) = after_steps(&worker);
+        assert!(matches!(last, Reply::Failed { error: EngineError::Cancelled, .. }), "{last:?}");
+        assert!(matches!(reply(&worker), Reply::Changed(_)));
+
+        worker.request(Job::Optimise);
+        running(&worker, "Optimising the embedding");
+        worker.request(Job::Save("x".into()));
+        worker.stop();
+        assert!(matches!(after_steps(&worker).1, Reply::Optimised(_)));
+        assert!(matches!(reply(&worker), Reply::Saved(_)));
     }
 
     #[test]

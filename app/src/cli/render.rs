@@ -26,7 +26,9 @@ pub fn run(arguments: &RenderArguments, opener: &dyn Opener) -> anyhow::Result<(
 
 /// The whole model, with all that the window shows of it.
 fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
-    let overlay = shading::Overlay { scene, proposal: None, selected: None, layout: true, strips: true, place: None };
+    let layout = scene.layout.as_deref();
+    let overlay =
+        shading::Overlay { scene, proposal: None, selected: None, layout, part: None, strips: true, place: None };
     let (lines, markers) = shading::overlay(&overlay);
     let mut camera = Camera {
         yaw: arguments.yaw.to_radians(),
@@ -38,7 +40,7 @@ fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
     camera.frame(&shading::framing_points(&scene.surface), size);
     Frame {
         scene: SceneInput {
-            surface: Arc::new(shading::surface(&scene.surface)),
+            surface: Arc::new(shading::surface(&scene.surface, None)),
             lines: Arc::new(lines),
             markers: Arc::new(markers),
         },

@@ -40,7 +40,7 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
         (None, Some(n)) => QuadSize::Count(u32::try_from(n).context("that many quads do not fit into memory")?),
         (None, None) => ExportOptions::default().size,
     };
-    let export = write_all(&session, &ExportOptions { size }, &arguments.out, seconds, &progress)?
+    let export = write_all(&session, None, &ExportOptions { size }, &arguments.out, seconds, &progress)?
         .map_err(|error| explain(&session, error))?;
     say(&format!(
         "{}: {} strips, {} patches, {} nodes ({} irregular), {} quads, {:.1} s",

@@ -203,9 +203,14 @@ mod tests {
     #[test]
     fn markers_and_stripes_show() {
         let mut gpu = Headless::new().unwrap();
-        let marker = Marker { position: [0.1, 0.1, 0.0], color: [0, 255, 0, 255], radius: 6.0, hidden: 0.0 };
-        let marked = gpu.render(&frame(false, vec![], vec![marker])).unwrap();
-        assert!((50..130).contains(&greens(&marked)), "{}", greens(&marked));
+        let marker =
+            Marker { position: [0.1, 0.1, 0.0], color: [0, 255, 0, 255], radius: 6.0, hidden: 0.0, square: false };
+        let marked = gpu.render(&frame(false, vec![], vec![marker.clone()])).unwrap();
+        let disc = greens(&marked);
+        assert!((50..130).contains(&disc), "{disc}");
+        let square = Marker { square: true, radius: 9.0, ..marker };
+        let square = greens(&gpu.render(&frame(false, vec![], vec![square])).unwrap());
+        assert!(square > disc && square < 15 * 15, "{square}");
         let blue = |p: &image::RgbaImage| p.pixels().filter(|p| p[2] > p[0].saturating_add(40)).count();
         assert_eq!(blue(&gpu.render(&frame(false, vec![], vec![])).unwrap()), 0);
         assert!(blue(&gpu.render(&frame(true, vec![], vec![])).unwrap()) > 300);

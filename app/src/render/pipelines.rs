@@ -21,7 +21,7 @@ pub struct SegmentInstance {
 pub struct MarkerInstance {
     pub position: [f32; 3],
     pub color: [u8; 4],
-    pub style: [f32; 2],
+    pub style: [f32; 3],
 }
 
 pub struct Pipelines {
@@ -38,7 +38,7 @@ const SURFACE_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
 const SEGMENT_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
     0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Unorm8x4, 5 => Float32x2];
 const MARKER_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
-    wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4, 2 => Float32x2];
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4, 2 => Float32x3];
 
 impl Pipelines {
     pub fn new(device: &wgpu::Device, output: wgpu::TextureFormat) -> Self {

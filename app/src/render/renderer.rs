@@ -193,5 +193,5 @@ fn segments(line: &Polyline) -> impl Iterator<Item = SegmentInstance> {
 }
 
 fn marker(m: &Marker) -> MarkerInstance {
-    MarkerInstance { position: m.position, color: m.color, style: [m.radius, m.hidden] }
+    MarkerInstance { position: m.position, color: m.color, style: [m.radius, m.hidden, f32::from(u8::from(m.square))] }
 }

@@ -43,7 +43,7 @@ pub struct Polyline {
     pub hidden: f32,
 }
 
-/// A disc of constant size on the screen.
+/// A disc or a square of constant size on the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
     /// Centre in world space.
@@ -54,6 +54,8 @@ pub struct Marker {
     pub radius: f32,
     /// How much of its colour the marker keeps behind the surface, from 0 to 1.
     pub hidden: f32,
+    /// Whether it is a square with a pale core instead of a disc.
+    pub square: bool,
 }
 
 /// Everything of one picture but the view. The parts are shared, and uploaded again only when they are others.

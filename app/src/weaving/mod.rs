@@ -1,9 +1,11 @@
 //! The engine of the window: a session of the library behind [`Engine`], with its snapshots.
 
+mod embedding;
 mod snapshot;
 mod stripes;
 mod words;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,8 +18,8 @@ use plait_core::surface::SurfacePoint;
 use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
 use crate::engine::{
-    BuiltIn, Engine, EngineError, ExportOptions, ExportReport, LayoutNode, LayoutPreview, Opener, Proposal, Refinement,
-    Scene, Source, StripId,
+    BuiltIn, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview, Opener,
+    Proposal, Refinement, Scene, Source, StripId,
 };
 
 /// File name ending of designs.
@@ -119,12 +121,23 @@ struct SessionEngine {
     later: Later,
 }
 
-/// What is computed after a change, while nothing else is asked: of the strips it was computed for, or not yet
-/// (outer `None`), or in vain (inner `None`).
+/// What is computed after a change, while nothing else is asked or on request, of the strips it was computed for.
 #[derive(Default)]
 pub struct Later {
     woven: Option<Arc<Woven>>,
-    layout: Option<Option<Arc<LayoutPreview>>>,
+    /// The first drawing of the layout: not yet there (outer `None`), or in vain (inner `None`).
+    drawn: Option<Option<embedding::Shown>>,
+    /// Its optimised embedding.
+    embedded: Option<embedding::Optimised>,
+}
+
+impl Later {
+    /// The layout as it is shown, with its pins.
+    fn preview(&self, session: &Session) -> Option<LayoutPreview> {
+        let shown = self.drawn.as_ref()?.as_ref()?;
+        let preview = self.embedded.as_ref().map_or(&shown.preview, |e| &e.preview);
+        Some(embedding::with_pins(preview, &shown.drawn.pinned(&session.design().pins)))
+    }
 }
 
 impl SessionEngine {
@@ -206,13 +219,42 @@ impl Engine for SessionEngine {
     }
 
     fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError> {
-        if self.later.layout.is_some() {
+        if self.later.drawn.is_some() {
             return Ok(false);
         }
-        let layout = or_nothing(layout_preview(&self.session, progress), progress)?;
-        self.later.layout = Some(layout.map(Arc::new));
+        self.later.drawn = Some(or_nothing(embedding::Shown::new(&self.session, progress), progress)?);
         self.refresh();
         Ok(true)
+    }
+
+    fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError> {
+        let Some(Some(shown)) = &self.later.drawn else { return Err(EngineError::failed("there is no layout yet")) };
+        let mut parts = shown.drawn.pinned(&self.session.design().pins);
+        let place = match part {
+            LayoutPart::Node(i) => parts.nodes.get_mut(i),
+            LayoutPart::Arc(i) => parts.arcs.get_mut(i),
+        };
+        *place.ok_or_else(|| EngineError::failed("the layout has no such part"))? = pinned;
+        let pins = embedding::pins(&shown.drawn, &parts);
+        self.session.set_pins(pins);
+        self.refresh();
+        Ok(())
+    }
+
+    fn optimise(
+        &mut self,
+        watch: &mut dyn FnMut(EmbeddingStep) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<(), EngineError> {
+        if !matches!(self.later.drawn, Some(Some(_))) {
+            let shown = embedding::Shown::new(&self.session, progress);
+            self.later.drawn = Some(Some(shown.map_err(|e| failed(e, Some(&self.session)))?));
+        }
+        let Some(Some(shown)) = &self.later.drawn else { return Err(EngineError::failed("there is no layout yet")) };
+        let optimised = embedding::optimise(&self.session, shown, self.later.embedded.as_ref(), watch, progress)?;
+        self.later.embedded = Some(optimised);
+        self.refresh();
+        Ok(())
     }
 
     fn save(&self, path: &Path) -> Result<(), EngineError> {
@@ -229,8 +271,12 @@ impl Engine for SessionEngine {
             Refinement::Quads(count) => QuadSize::Count(u32::try_from(count).unwrap_or(u32::MAX)),
             Refinement::EdgeLength(length) => QuadSize::EdgeLength(length),
         };
-        let written =
-            weave::write_all(&self.session, &weave::ExportOptions { size }, folder, Default::default(), progress);
+        let optimised = match (&self.later.drawn, &self.later.embedded) {
+            (Some(Some(shown)), Some(optimised)) => Some((&shown.drawn.layout, &optimised.embedded)),
+            _ => None,
+        };
+        let options = weave::ExportOptions { size };
+        let written = weave::write_all(&self.session, optimised, &options, folder, Default::default(), progress);
         let export = written.and_then(|result| result).map_err(|e| failed(e, Some(&self.session)))?;
         let (nodes, patches) = (&export.layout.nodes, &export.layout.patches);
         let summary = format!(
@@ -256,22 +302,3 @@ fn or_nothing<T>(result: Result<T, impl std::fmt::Display>, progress: &Progress)
         |value| Ok(Some(value)),
     )
 }
-
-/// Nodes and arcs of the layout on the surface.
-fn layout_preview(session: &Session, progress: &Progress) -> Result<LayoutPreview, WeaveError> {
-    let export = weave::export(session, &weave::ExportOptions { size: QuadSize::Count(PREVIEW_QUADS) }, progress)?;
-    let quads = &export.quads;
-    let node = |(node, &position): (&plait_core::layout::Node, &DVec3)| LayoutNode {
-        position,
-        valence: node.valence as u32,
-        irregular: !node.is_regular(),
-    };
-    let position = |&v: &u32| quads.positions[v as usize];
-    Ok(LayoutPreview {
-        arcs: quads.arcs.iter().map(|arc| arc.iter().map(position).collect()).collect(),
-        nodes: export.layout.nodes.iter().zip(&quads.positions).map(node).collect(),
-    })
-}
-
-/// Quads behind the preview of a layout: its arcs are those of the exported quads, at half their fineness.
-const PREVIEW_QUADS: u32 = 3000;

@@ -46,7 +46,8 @@ impl ModelSnapshot {
             remains: words::remains(session),
             summary,
             exportable,
-            layout: later.layout.clone().flatten(),
+            layout: later.preview(session).map(Arc::new),
+            embedding: later.embedded.as_ref().map(|e| Arc::clone(&e.summary)),
             can_undo: session.can_undo(),
             can_redo: session.can_redo(),
         }
@@ -66,7 +67,8 @@ impl ModelSnapshot {
         };
         let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
         let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
-        DisplaySurface { positions: refined.positions.clone(), faces, normals, regions, stripes }
+        let base = (0..refined.n_faces() as u32).map(|f| refined.base_face(f)).collect();
+        DisplaySurface { positions: refined.positions.clone(), faces, normals, base, regions, stripes }
     }
 
     /// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::engine::{Source, StripId};
+use crate::distortion::Colours;
+use crate::engine::{LayoutPart, Source, StripId};
 
 /// A wish of the user, from a button, a menu or a key.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +30,16 @@ pub enum Action {
     Remove(StripId),
     /// Show or hide a strip.
     SetVisible(StripId, bool),
+    /// Optimise the embedding of the layout.
+    Optimise,
+    /// Stop the optimisation and keep the best so far.
+    Stop,
+    /// Pin a part of the layout, or let it go.
+    SetPinned(LayoutPart, bool),
+    /// Let all parts of the layout go.
+    UnpinAll,
+    /// What the surface's colours tell.
+    Colours(Colours),
     /// Look at the whole model.
     FrameAll,
     /// Look at a place.

@@ -2,9 +2,11 @@
 
 mod action;
 mod dialogs;
+mod embedding;
 mod icons;
 mod messages;
 mod panels;
+mod parts;
 mod theme;
 mod view;
 
@@ -20,7 +22,11 @@ use messages::{Messages, Tone};
 use view::{Hover, Prepared};
 
 use crate::camera::Camera;
-use crate::engine::{EngineError, ExportOptions, Opener, Refinement, RegionColor, Scene, Source, StripId};
+use crate::distortion::Colours;
+use crate::engine::{
+    EmbeddingStep, EmbeddingSummary, EngineError, ExportOptions, LayoutPart, LayoutPreview, Opener, Refinement,
+    RegionColor, Scene, Source, StripId,
+};
 use crate::input::Input;
 use crate::render::Renderer;
 use crate::shading;
@@ -58,6 +64,9 @@ pub struct PlaitApp {
     hover: Hover,
     prepared: Prepared,
     options: ViewOptions,
+    colours: Colours,
+    /// The embedding being optimised, as it was last heard of.
+    step: Option<EmbeddingStep>,
     selected: Option<StripId>,
     messages: Messages,
     dialogs: Dialogs,
@@ -100,6 +109,8 @@ impl PlaitApp {
             hover: Hover::default(),
             prepared: Prepared::default(),
             options: ViewOptions::default(),
+            colours: Colours::default(),
+            step: None,
             selected: None,
             messages: Messages::default(),
             dialogs: Dialogs::default(),
@@ -125,6 +136,32 @@ impl PlaitApp {
     /// The strip selected in the list.
     pub fn selected(&self) -> Option<StripId> {
         self.selected
+    }
+
+    /// The arcs and nodes shown: those of the optimisation on its way, or of the scene.
+    pub fn layout(&self) -> Option<&LayoutPreview> {
+        let layout = self.scene.as_ref().and_then(|s| s.layout.as_deref());
+        self.step.as_ref().map(|s| &s.layout).or(layout)
+    }
+
+    /// The part of the layout that a click would pin or let go.
+    pub fn pinnable(&self) -> Option<LayoutPart> {
+        self.hover.part
+    }
+
+    /// What the surface's colours tell now.
+    pub fn colours(&self) -> Colours {
+        if self.summary().is_some() { self.colours } else { Colours::Regions }
+    }
+
+    /// The figures of the optimised embedding that is shown.
+    fn summary(&self) -> Option<&Arc<EmbeddingSummary>> {
+        self.scene.as_ref().filter(|_| self.step.is_none()).and_then(|s| s.embedding.as_ref())
+    }
+
+    /// The optimisation that is on its way.
+    fn optimisation(&self) -> Option<Running> {
+        self.worker.running().filter(|r| r.stop.is_some())
     }
 
     /// The camera.
@@ -157,7 +194,8 @@ impl PlaitApp {
 
     /// The work that has been going on long enough to be shown.
     fn long_work(&self) -> Option<Running> {
-        self.worker.running().filter(|r| !r.yields && r.since.elapsed() >= SHORT)
+        // An optimisation has its place in the panel.
+        self.worker.running().filter(|r| !r.yields && r.stop.is_none() && r.since.elapsed() >= SHORT)
     }
 
     fn take_replies(&mut self) {
@@ -166,6 +204,11 @@ impl PlaitApp {
                 Reply::Opened { source, scene } => self.opened(&source, scene),
                 Reply::Changed(scene) => self.changed(scene),
                 Reply::Completed(scene) => self.scene = Some(scene),
+                Reply::Improved(step) => self.step = Some(step),
+                Reply::Optimised(scene) => {
+                    self.step = None;
+                    self.scene = Some(scene);
+                }
                 Reply::Proposals { generation, proposals, complete } => {
                     if let Some(proposal) = self.hover.arrived(generation, proposals, complete) {
                         self.worker.request(Job::Place(proposal));
@@ -177,12 +220,20 @@ impl PlaitApp {
                     let text = format!("Exported to {}: {}", folder.display(), report.summary);
                     self.messages.add(Tone::Done, text, None);
                 }
-                Reply::Failed { label, error } => match error {
-                    EngineError::Cancelled => self.messages.add(Tone::Note, format!("{label}: cancelled"), None),
-                    EngineError::Failed { message, place } => {
-                        self.messages.add(Tone::Failed, format!("{label} failed: {message}"), place);
-                    }
-                },
+                Reply::Failed { label, error } => {
+                    // Whatever was on its way did not come to an end.
+                    self.step = None;
+                    self.failed(&label, error);
+                }
+            }
+        }
+    }
+
+    fn failed(&mut self, label: &str, error: EngineError) {
+        match error {
+            EngineError::Cancelled => self.messages.add(Tone::Note, format!("{label}: cancelled"), None),
+            EngineError::Failed { message, place } => {
+                self.messages.add(Tone::Failed, format!("{label} failed: {message}"), place);
             }
         }
     }
@@ -194,6 +245,8 @@ impl PlaitApp {
             self.messages.add(Tone::Note, text, None);
         }
         self.selected = None;
+        self.step = None;
+        self.colours = Colours::default();
         self.hover = Hover::default();
         self.scene = Some(scene);
         self.camera = Camera { z_up: self.options.z_up, ..Camera::default() };
@@ -206,6 +259,10 @@ impl PlaitApp {
         }
         // What was offered was compatible with the strips as they were.
         self.hover.clear();
+        if scene.embedding.is_none() && self.scene.as_ref().is_some_and(|s| s.embedding.is_some()) {
+            let text = "The strips changed: the optimised embedding is gone. Optimise again once the layout is valid.";
+            self.messages.add(Tone::Note, text.into(), None);
+        }
         self.scene = Some(scene);
     }
 
@@ -217,12 +274,22 @@ impl PlaitApp {
             Action::AskSave => self.ask_with_name(Asked::Save, ctx),
             Action::AskExport => self.ask_export(ctx),
             Action::Quads(quads) => self.quads = quads,
+            // What is on its way is taken back first.
+            Action::Undo if self.optimisation().is_some() => self.worker.cancel(),
             Action::Undo => self.change(Job::Undo),
             Action::Redo => self.change(Job::Redo),
             Action::Suggest => self.change(Job::Suggest),
             Action::Select(strip) => self.selected = strip,
             Action::Remove(strip) => self.change(Job::Remove(strip)),
             Action::SetVisible(strip, visible) => self.worker.request(Job::SetVisible(strip, visible)),
+            Action::Optimise => self.optimise(),
+            Action::Stop => self.worker.stop(),
+            Action::SetPinned(part, pinned) => self.worker.request(Job::SetPinned(part, pinned)),
+            Action::UnpinAll => {
+                let pinned = self.layout().map(LayoutPreview::pinned).unwrap_or_default();
+                pinned.into_iter().for_each(|p| self.worker.request(Job::SetPinned(p, false)));
+            }
+            Action::Colours(colours) => self.colours = colours,
             Action::FrameAll => self.frame_all(),
             Action::LookAt(place) => self.look_at(place.as_vec3()),
             Action::Toggle(option) => {
@@ -241,6 +308,13 @@ impl PlaitApp {
         if self.scene.is_some() {
             self.hover.clear();
             self.worker.request(job);
+        }
+    }
+
+    fn optimise(&mut self) {
+        if self.scene.as_ref().is_some_and(|s| s.exportable) && self.optimisation().is_none() {
+            self.hover.clear();
+            self.worker.request(Job::Optimise);
         }
     }
 

@@ -7,8 +7,8 @@ use egui::{
 use super::action::{Action, ViewOption};
 use super::icons::{self, Icon};
 use super::messages::{Message, Tone};
-use super::{PlaitApp, theme};
-use crate::engine::{Remark, Scene, Source, Strip};
+use super::{PlaitApp, embedding, theme};
+use crate::engine::{LayoutPart, Remark, Scene, Source, Strip};
 use crate::shading::{self, region_rgb};
 
 const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
@@ -28,6 +28,8 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
             ("Wheel", "browse alternatives through the same point"),
             ("Click", "place the strip shown"),
             ("S", "place the strip that helps most"),
+            ("Click on a node or an arc", "pin it where it is, or let it go"),
+            ("M", "optimise the embedding; again: stop, keep the best"),
             ("Delete", "remove the selected strip"),
             ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
             ("Escape", "cancel what is running; deselect"),
@@ -89,6 +91,9 @@ pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
         }
         if i.consume_key(Modifiers::NONE, Key::S) {
             actions.push(Action::Suggest);
+        }
+        if i.consume_key(Modifiers::NONE, Key::M) {
+            actions.push(if app.optimisation().is_some() { Action::Stop } else { Action::Optimise });
         }
         if i.consume_key(Modifiers::NONE, Key::F) {
             actions.push(Action::FrameAll);
@@ -157,6 +162,8 @@ fn menus(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
         let remove = app.selected.map(Action::Remove);
         item(ui, actions, "Remove strip", "Delete", remove.is_some(), remove.unwrap_or(Action::Select(None)));
         item(ui, actions, "Suggest a strip", "S", scene.is_some(), Action::Suggest);
+        let valid = scene.is_some_and(|s| s.exportable) && app.optimisation().is_none();
+        item(ui, actions, "Optimise the embedding", "M", valid, Action::Optimise);
     });
     ui.menu_button("View", |ui| view_menu(app, ui, actions));
     ui.menu_button("Help", |ui| {
@@ -239,12 +246,15 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
     section(ui, "What remains");
     what_remains(scene, ui, actions);
     ui.add_space(4.0);
-    if scene.exportable {
-        export_row(app, ui, actions);
-    }
     let useful = !scene.exportable || !scene.remains.is_empty();
     if wide_button(ui, "Suggest a strip", !scene.exportable, useful, "Places the strip that helps most now (S)") {
         actions.push(Action::Suggest);
+    }
+    section(ui, "Embedding");
+    embedding::show(app, scene, ui, actions);
+    if scene.exportable {
+        section(ui, "Export");
+        export_row(app, ui, actions);
     }
     section(ui, &format!("Strips · {}", scene.strips.len()));
     if scene.strips.is_empty() {
@@ -275,7 +285,7 @@ fn export_row(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
 }
 
 /// A button over the whole width; `primary` fills it with the accent. Returns whether it was clicked.
-fn wide_button(ui: &mut Ui, text: &str, primary: bool, enabled: bool, hover: &str) -> bool {
+pub fn wide_button(ui: &mut Ui, text: &str, primary: bool, enabled: bool, hover: &str) -> bool {
     let text = RichText::new(text).color(match (enabled, primary) {
         (true, true) => Color32::WHITE,
         (true, false) => theme::TEXT,
@@ -314,7 +324,7 @@ fn what_remains(scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
     });
 }
 
-fn remark_row(remark: &Remark, color: Color32, ui: &mut Ui, actions: &mut Vec<Action>) {
+pub fn remark_row(remark: &Remark, color: Color32, ui: &mut Ui, actions: &mut Vec<Action>) {
     ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(12.0, 18.0), egui::Sense::hover());
         ui.painter().circle_filled(rect.center(), 5.0, color);
@@ -379,10 +389,20 @@ fn significant(length: f64) -> String {
 }
 
 fn status(app: &PlaitApp, ui: &mut Ui) {
+    let pinned = |part| app.layout().and_then(|l| l.is_pinned(part)) == Some(true);
     let hint = if app.scene.is_none() {
         "Drop a mesh on the window, or open one with Ctrl+O"
+    } else if app.optimisation().is_some() {
+        "Stop keeps the best embedding so far · Escape drops it · Drag: orbit"
     } else if app.input.is_dragging() {
         "Left or middle drag: orbit · Right drag: pan"
+    } else if let Some(part) = app.hover.part {
+        match (part, pinned(part)) {
+            (LayoutPart::Node(_), false) => "Click: pin this node, so that optimising leaves it where it is",
+            (LayoutPart::Node(_), true) => "Click: let this node go again",
+            (LayoutPart::Arc(_), false) => "Click: pin this arc, so that optimising leaves it where it is",
+            (LayoutPart::Arc(_), true) => "Click: let this arc go again",
+        }
     } else if app.hover.proposals.len() > 1 {
         "Click: place this strip · Wheel: other strips through this point · Drag: orbit"
     } else if app.hover.shown().is_some() {
@@ -406,6 +426,7 @@ pub fn over_view(app: &mut PlaitApp, ctx: &egui::Context, actions: &mut Vec<Acti
     }
     show_messages(&messages, ctx, actions);
     progress(app, ctx, actions);
+    embedding::legend(app, ctx);
     if app.shortcuts_open {
         shortcuts(ctx, actions);
     }
@@ -414,7 +435,7 @@ pub fn over_view(app: &mut PlaitApp, ctx: &egui::Context, actions: &mut Vec<Acti
     }
 }
 
-fn floating(fill: Color32, stroke: Color32) -> Frame {
+pub fn floating(fill: Color32, stroke: Color32) -> Frame {
     Frame::new()
         .fill(fill)
         .stroke(Stroke::new(1.0, stroke))

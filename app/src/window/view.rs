@@ -7,10 +7,10 @@ use egui::{Align2, Color32, FontId, PaintCallbackInfo, Pos2, Rect, Sense, Stroke
 use glam::Vec2;
 use plait_core::surface::SurfacePoint;
 
-use super::PlaitApp;
-use super::theme;
-use crate::engine::Proposal;
-use crate::input::{Button, Held, Intent, PointerEvent};
+use super::{PlaitApp, parts, theme};
+use crate::distortion::Colours;
+use crate::engine::{DisplaySurface, EmbeddingSummary, LayoutPart, Proposal};
+use crate::input::{Button, Held, Intent, PointerEvent, Under};
 use crate::render::{Frame, Marker, Polyline, Renderer, SceneInput, SurfaceMesh, Toggles};
 use crate::shading;
 use crate::worker::Job;
@@ -24,6 +24,8 @@ const CALM: f32 = 7.0;
 pub struct Hover {
     /// The surface point under the pointer, found anew whenever the pointer or the view moved.
     pub point: Option<SurfacePoint>,
+    /// The node or arc under the pointer, if it can be pinned.
+    pub part: Option<LayoutPart>,
     /// The request that was sent last, while the user wants an answer.
     generation: Option<u64>,
     /// Strips through the point, best first.
@@ -61,7 +63,7 @@ impl Hover {
 
     /// Shows nothing and wants nothing.
     pub fn clear(&mut self) {
-        *self = Self { calm_at: self.calm_at, point: self.point, ..Self::default() };
+        *self = Self { calm_at: self.calm_at, point: self.point, part: self.part, ..Self::default() };
     }
 
     /// Moves the choice among the alternatives, ending at the first and the last.
@@ -74,18 +76,33 @@ impl Hover {
 /// What was last made for the renderer, to be made anew only when it changed.
 #[derive(Default)]
 pub struct Prepared {
-    surface: Option<(Arc<crate::engine::DisplaySurface>, Arc<SurfaceMesh>)>,
+    surface: Option<(Drawn, Arc<SurfaceMesh>)>,
     lines: Arc<Vec<Polyline>>,
     markers: Arc<Vec<Marker>>,
 }
 
+/// What a surface was made of: its triangles, and what gives them their colours.
+struct Drawn {
+    display: Arc<DisplaySurface>,
+    colours: Colours,
+    summary: Option<Arc<EmbeddingSummary>>,
+}
+
+impl Drawn {
+    fn is(&self, other: &Self) -> bool {
+        let of = |d: &Self| d.summary.as_ref().map(Arc::as_ptr);
+        Arc::ptr_eq(&self.display, &other.display) && self.colours == other.colours && of(self) == of(other)
+    }
+}
+
 impl Prepared {
-    fn surface(&mut self, display: &Arc<crate::engine::DisplaySurface>) -> Arc<SurfaceMesh> {
+    fn surface(&mut self, drawn: Drawn) -> Arc<SurfaceMesh> {
         match &self.surface {
-            Some((held, mesh)) if Arc::ptr_eq(held, display) => Arc::clone(mesh),
+            Some((held, mesh)) if held.is(&drawn) => Arc::clone(mesh),
             _ => {
-                let mesh = Arc::new(shading::surface(display));
-                self.surface = Some((Arc::clone(display), Arc::clone(&mesh)));
+                let tints = drawn.summary.as_ref().and_then(|s| drawn.colours.tints(s));
+                let mesh = Arc::new(shading::surface(&drawn.display, tints.as_deref()));
+                self.surface = Some((drawn, Arc::clone(&mesh)));
                 mesh
             }
         }
@@ -114,15 +131,23 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
     for event in pointer_events(ui, rect, inside) {
         if let Some(at) = event_position(event) {
             app.hover.point = app.pick(at);
+            app.hover.part = parts::under(app, at);
         }
-        let intent = app.input.handle(event, app.hover.point.is_some());
+        let under = match (app.hover.part, app.hover.point) {
+            (Some(_), _) => Under::Part,
+            (None, Some(_)) => Under::Surface,
+            (None, None) => Under::Background,
+        };
+        let intent = app.input.handle(event, under);
         if let Some(intent) = intent {
             carry_out(app, intent);
         }
     }
     if app.input.is_dragging() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
-    } else if response.contains_pointer() && app.hover.point.is_some() {
+    } else if response.contains_pointer() && app.hover.part.is_some() {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+    } else if response.contains_pointer() && app.hover.point.is_some() && app.optimisation().is_none() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
     }
     paint(app, ui, rect);
@@ -199,6 +224,7 @@ fn carry_out(app: &mut PlaitApp, intent: Intent) {
             app.hover.calm_at = app.input.position();
         }
         Intent::Place(at) => place(app, at),
+        Intent::Pin(_) => pin(app),
         Intent::Orbit(delta) => app.camera.orbit(delta),
         Intent::Pan(delta) => app.camera.pan(delta, app.view_size),
         Intent::Zoom(factor, at) => {
@@ -214,6 +240,12 @@ fn hover(app: &mut PlaitApp, at: Vec2) {
         return;
     }
     app.hover.calm_at = None;
+    // Over an arc a click would not place; during an optimisation it would drop that.
+    if app.hover.part.is_some() || app.optimisation().is_some() {
+        app.hover.clear();
+        app.worker.forget_hover();
+        return;
+    }
     match app.hover.point {
         Some(_) if app.hover.asked_at == Some(at) => {}
         Some(point) => {
@@ -228,7 +260,18 @@ fn hover(app: &mut PlaitApp, at: Vec2) {
     }
 }
 
+/// Pins what is under the pointer, or lets it go.
+fn pin(app: &mut PlaitApp) {
+    let pinned = |part| app.layout().and_then(|l| l.is_pinned(part)).map(|pinned| (part, pinned));
+    if let Some((part, pinned)) = app.hover.part.and_then(pinned) {
+        app.worker.request(Job::SetPinned(part, !pinned));
+    }
+}
+
 fn place(app: &mut PlaitApp, at: Vec2) {
+    if app.optimisation().is_some() {
+        return;
+    }
     let calm_here = app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM);
     match app.hover.shown().cloned() {
         Some(proposal) if app.hover.generation.is_none() => {
@@ -284,7 +327,13 @@ fn paint(app: &mut PlaitApp, ui: &Ui, rect: Rect) {
     };
     let viewport = info.viewport_in_pixels();
     let size = [viewport.width_px.max(1) as u32, viewport.height_px.max(1) as u32];
-    let toggles = Toggles { stripes: app.options.stripes, wireframe: app.options.wireframe, tint: app.options.regions };
+    // Colours that are read by a scale must not be mixed with a pattern.
+    let scale = app.colours() != Colours::Regions;
+    let toggles = Toggles {
+        stripes: app.options.stripes && !scale,
+        wireframe: app.options.wireframe,
+        tint: app.options.regions || scale,
+    };
     let view = app.camera.uniforms(Vec2::new(size[0] as f32, size[1] as f32));
     let frame = Frame { scene: scene_input(app), view, toggles, size, pixels_per_point };
     ui.painter().add(Callback::new_paint_callback(rect, ViewCallback { frame }));
@@ -292,16 +341,21 @@ fn paint(app: &mut PlaitApp, ui: &Ui, rect: Rect) {
 
 fn scene_input(app: &mut PlaitApp) -> SceneInput {
     let Some(scene) = app.scene.clone() else { return SceneInput::default() };
-    let surface = app.prepared.surface(&scene.surface);
+    let (colours, summary) = (app.colours(), app.summary().cloned());
+    let drawn = Drawn { display: Arc::clone(&scene.surface), colours, summary };
+    let mut prepared = std::mem::take(&mut app.prepared);
+    let surface = prepared.surface(drawn);
     let overlay = shading::Overlay {
         scene: &scene,
         proposal: app.hover.shown(),
         selected: app.selected,
-        layout: app.options.layout,
-        strips: app.options.stripes,
+        layout: app.layout().filter(|_| app.options.layout),
+        part: app.hover.part,
+        strips: app.options.stripes && colours == Colours::Regions,
         place: app.marked_place(),
     };
-    let (lines, markers) = app.prepared.overlay(Some(&overlay));
+    let (lines, markers) = prepared.overlay(Some(&overlay));
+    app.prepared = prepared;
     SceneInput { surface, lines, markers }
 }
 

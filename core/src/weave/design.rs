@@ -27,6 +27,17 @@ pub struct Strip {
     pub visible: bool,
 }
 
+/// A part of the layout that is to stay where it is when the embedding is optimised. It is told by a point of the first
+/// drawing of the layout, which is the same for the same strips, on the mesh of bounding-box diagonal 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pin {
+    /// The node at this point.
+    Node([f64; 3]),
+    /// The arc with this point in its middle.
+    Arc([f64; 3]),
+}
+
 /// Why a design could not be read or written.
 #[derive(Debug, Error)]
 pub enum DesignError {
@@ -73,12 +84,16 @@ pub struct Design {
     pub options: Options,
     /// The strips in the order placed.
     pub strips: Vec<Strip>,
+    /// What of their layout is to stay where it is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pins: Vec<Pin>,
 }
 
 impl Design {
     /// A design without strips.
     pub fn new(source: MeshSource, mesh: &TriMesh, options: Options) -> Self {
-        Self { version: VERSION, mesh: source, fingerprint: fingerprint(mesh), options, strips: Vec::new() }
+        let (strips, pins) = (Vec::new(), Vec::new());
+        Self { version: VERSION, mesh: source, fingerprint: fingerprint(mesh), options, strips, pins }
     }
 
     /// Reads a design.

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::embedding::{Drawn, draw};
 use super::session::{Session, WeaveError};
 use crate::dual::Colour;
-use crate::layout::{Embedding, PatchMap, QuadLayout, embed, map_patches};
-use crate::mesh::{Normalization, VertexId, write_obj};
+use crate::embed::Embedded;
+use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
+use crate::mesh::{Normalization, write_obj};
 use crate::progress::Progress;
 use crate::quad::{QuadMesh, chord_counts, quality, refine, smooth};
 
@@ -54,12 +56,26 @@ pub struct Export {
 ///
 /// [`crate::layout::LayoutError::RedRegions`] while there are red regions.
 pub fn export(session: &Session, options: &ExportOptions, progress: &Progress) -> Result<Export, WeaveError> {
-    let (model, woven) = (session.model(), session.woven());
-    let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
-    progress.report("Drawing nodes and arcs", 0.1);
-    let embedding = embed(&woven.arrangement, &layout, &preferred_nodes(session), progress)?;
+    let Drawn { layout, embedding } = draw(session, progress)?;
     progress.report("Mapping patches", 0.4);
     let maps = map_patches(&layout, &embedding, progress)?;
+    export_embedded(session, layout, embedding, maps, options, progress)
+}
+
+/// The layout of a session as it was embedded before, refined.
+///
+/// # Errors
+///
+/// When cancelled.
+pub fn export_embedded(
+    session: &Session,
+    layout: QuadLayout,
+    embedding: Embedding,
+    maps: Vec<PatchMap>,
+    options: &ExportOptions,
+    progress: &Progress,
+) -> Result<Export, WeaveError> {
+    let model = session.model();
     progress.report("Refining to quads", 0.7);
     let target = match options.size {
         QuadSize::EdgeLength(length) => length / model.loaded.units.scale,
@@ -70,12 +86,6 @@ pub fn export(session: &Session, options: &ExportOptions, progress: &Progress) -
     smooth(&mut quads, &model.mesh, progress)?;
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, maps, quads })
-}
-
-/// The vertex of the only pronounced corner of each region that has just one.
-fn preferred_nodes(session: &Session) -> Vec<Option<VertexId>> {
-    let only = |corners: &[(VertexId, i8)]| (corners.len() == 1).then(|| corners[0].0);
-    session.woven().reports.iter().map(|r| only(&r.corners)).collect()
 }
 
 /// The edge length at which the patches' rectangles hold about `n` quads.
@@ -201,13 +211,14 @@ impl Export {
 
 /// Writes `design.plait` and `report.json`, and of a valid layout the meshes; returns whether it is valid.
 ///
-/// `seconds` are times to note in the report.
+/// `embedded` is the layout with its optimised embedding, where there is one; `seconds` are times to note in the report.
 ///
 /// # Errors
 ///
 /// The file that could not be written, or cancelled.
 pub fn write_all(
     session: &Session,
+    embedded: Option<(&QuadLayout, &Embedded)>,
     options: &ExportOptions,
     folder: &Path,
     seconds: std::collections::BTreeMap<String, f64>,
@@ -215,7 +226,12 @@ pub fn write_all(
 ) -> Result<Result<Export, WeaveError>, WeaveError> {
     std::fs::create_dir_all(folder).map_err(|source| WeaveError::Write { path: folder.to_owned(), source })?;
     session.design().write(&folder.join("design.plait"))?;
-    let result = export(session, options, progress);
+    let result = match embedded {
+        Some((layout, e)) => {
+            export_embedded(session, layout.clone(), e.embedding.clone(), e.maps.clone(), options, progress)
+        }
+        None => export(session, options, progress),
+    };
     progress.check()?;
     if let Ok(export) = &result {
         export.write(folder, &session.model().loaded.units)?;

@@ -5,6 +5,7 @@
 
 mod design;
 mod detour;
+mod embedding;
 mod export;
 mod model;
 mod script;
@@ -14,8 +15,9 @@ mod suggest;
 mod tests;
 mod woven;
 
-pub use design::{Design, DesignError, Strip, StripId};
-pub use export::{Export, ExportOptions, QuadSize, export, write_all};
+pub use design::{Design, DesignError, Pin, Strip, StripId};
+pub use embedding::{Drawn, PinnedParts, draw, optimise};
+pub use export::{Export, ExportOptions, QuadSize, export, export_embedded, write_all};
 pub use model::{Model, Options};
 pub use script::{Script, ScriptError, Step, replay};
 pub use session::{Proposal, Session, WeaveError};

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::design::{Design, DesignError, Strip, StripId};
+use super::design::{Design, DesignError, Pin, Strip, StripId};
 use super::model::{Model, Options};
 use super::suggest::Stuck;
 use super::woven::Woven;
 use crate::dual::{Arrangement, ArrangementError};
 use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
+use crate::embed::EmbeddingError;
 use crate::field::FieldError;
 use crate::layout::{EmbedError, LayoutError, PatchError};
 use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh};
@@ -44,6 +45,9 @@ pub enum WeaveError {
     /// The layout could not be embedded.
     #[error(transparent)]
     Embed(#[from] EmbedError),
+    /// The embedding could not be optimised.
+    #[error(transparent)]
+    Embedding(#[from] EmbeddingError),
     /// The patches could not be mapped.
     #[error(transparent)]
     Patch(#[from] PatchError),
@@ -79,15 +83,22 @@ impl Proposal {
     }
 }
 
+/// A state of the history: strips, and the pins that were set while they were there.
+#[derive(Debug, Clone)]
+struct Step {
+    strips: Vec<Strip>,
+    pins: Vec<Pin>,
+}
+
 /// A model, the design woven on it, and its history.
 #[derive(Debug)]
 pub struct Session {
     model: Arc<Model>,
     design: Design,
     woven: Arc<Woven>,
-    /// Earlier and later lists of strips.
-    undo: Vec<Vec<Strip>>,
-    redo: Vec<Vec<Strip>>,
+    /// Earlier and later states.
+    undo: Vec<Step>,
+    redo: Vec<Step>,
     next_id: u32,
     workspace: SearchWorkspace,
 }
@@ -236,10 +247,10 @@ impl Session {
     ///
     /// When cancelled.
     pub fn undo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
-        let Some(strips) = self.undo.last().cloned() else { return Ok(()) };
-        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
+        let Some(step) = self.undo.last().cloned() else { return Ok(()) };
+        let now = self.turn_to(step, progress)?;
         self.undo.pop();
-        self.redo.push(std::mem::replace(&mut self.design.strips, strips));
+        self.redo.push(now);
         Ok(())
     }
 
@@ -249,18 +260,32 @@ impl Session {
     ///
     /// When cancelled.
     pub fn redo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
-        let Some(strips) = self.redo.last().cloned() else { return Ok(()) };
-        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
+        let Some(step) = self.redo.last().cloned() else { return Ok(()) };
+        let now = self.turn_to(step, progress)?;
         self.redo.pop();
-        self.undo.push(std::mem::replace(&mut self.design.strips, strips));
+        self.undo.push(now);
         Ok(())
     }
 
+    /// Says which parts of the present layout are to stay where they are; not a step of the history. Other strips make
+    /// another layout, which starts without pins.
+    pub fn set_pins(&mut self, pins: Vec<Pin>) {
+        self.design.pins = pins;
+    }
+
     fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
-        self.woven = Arc::new(Woven::new(&self.model, &strips, progress)?);
-        self.undo.push(std::mem::replace(&mut self.design.strips, strips));
+        let now = self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
+        self.undo.push(now);
         self.redo.clear();
         Ok(())
+    }
+
+    /// Weaves another state in place of the present one, which is returned.
+    fn turn_to(&mut self, step: Step, progress: &Progress) -> Result<Step, WeaveError> {
+        self.woven = Arc::new(Woven::new(&self.model, &step.strips, progress)?);
+        let strips = std::mem::replace(&mut self.design.strips, step.strips);
+        let pins = std::mem::replace(&mut self.design.pins, step.pins);
+        Ok(Step { strips, pins })
     }
 
     /// What the surface would look like with `proposal` added; for suggestions.

@@ -1,0 +1,255 @@
+//! The layout on the surface for the window: its first drawing, its optimisation, and what that achieved.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use glam::DVec3;
+use plait_core::embed::{
+    Embedded, EmbeddingError, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature, measure_patches,
+};
+use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout, map_patches};
+use plait_core::progress::Progress;
+use plait_core::weave::{self, Drawn, Pin, PinnedParts, QuadSize, Session, WeaveError};
+
+use crate::engine::{
+    EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColor, Remark,
+    TriangleDistortion,
+};
+
+/// Quads behind the preview of a layout: its arcs are those of the exported quads, at half their fineness.
+const PREVIEW_QUADS: u32 = 3000;
+/// Difference of the principal curvatures, as a fraction of its root mean square over the surface, from which on
+/// principal directions count as fully pronounced.
+const PRONOUNCED: f64 = 0.5;
+
+/// The first drawing of a layout, and how it is shown.
+pub struct Shown {
+    pub drawn: Drawn,
+    pub preview: LayoutPreview,
+}
+
+/// An optimised embedding, and how it is shown.
+pub struct Optimised {
+    pub embedded: Embedded,
+    pub preview: LayoutPreview,
+    pub summary: Arc<EmbeddingSummary>,
+}
+
+impl Shown {
+    /// Draws the layout of a session.
+    pub fn new(session: &Session, progress: &Progress) -> Result<Self, WeaveError> {
+        let Drawn { layout, embedding } = weave::draw(session, progress)?;
+        let maps = map_patches(&layout, &embedding, progress)?;
+        let options = weave::ExportOptions { size: QuadSize::Count(PREVIEW_QUADS) };
+        let export = weave::export_embedded(session, layout, embedding, maps, &options, progress)?;
+        let quads = &export.quads;
+        let arc = |arc: &Vec<u32>| arc.iter().map(|&v| quads.positions[v as usize]).collect();
+        let nodes = quads.positions[..quads.n_nodes].to_vec();
+        let preview = preview(&export.layout, &nodes, quads.arcs.iter().map(arc));
+        Ok(Self { drawn: Drawn { layout: export.layout, embedding: export.embedding }, preview })
+    }
+}
+
+fn preview(layout: &QuadLayout, nodes: &[DVec3], arcs: impl Iterator<Item = Vec<DVec3>>) -> LayoutPreview {
+    let node = |(node, &position): (&Node, &DVec3)| LayoutNode {
+        position,
+        valence: node.valence as u32,
+        irregular: !node.is_regular(),
+        pinned: false,
+    };
+    LayoutPreview {
+        arcs: arcs.map(|points| LayoutArc { points, pinned: false }).collect(),
+        nodes: layout.nodes.iter().zip(nodes).map(node).collect(),
+    }
+}
+
+/// A preview with the parts marked that are pinned.
+pub fn with_pins(preview: &LayoutPreview, pinned: &PinnedParts) -> LayoutPreview {
+    let mut preview = preview.clone();
+    for (node, &pinned) in preview.nodes.iter_mut().zip(&pinned.nodes) {
+        node.pinned = pinned;
+    }
+    for (arc, &pinned) in preview.arcs.iter_mut().zip(&pinned.arcs) {
+        arc.pinned = pinned;
+    }
+    preview
+}
+
+/// The pins that stand for parts of a layout.
+pub fn pins(drawn: &Drawn, parts: &PinnedParts) -> Vec<Pin> {
+    let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
+    let nodes = set(&parts.nodes).into_iter().filter_map(|i| drawn.node_pin(i));
+    let arcs = set(&parts.arcs).into_iter().filter_map(|i| drawn.arc_pin(i));
+    nodes.chain(arcs).collect()
+}
+
+/// Optimises the embedding, from that of last time on where there is one.
+pub fn optimise(
+    session: &Session,
+    shown: &Shown,
+    last: Option<&Optimised>,
+    watch: &mut dyn FnMut(EmbeddingStep) -> ControlFlow<()>,
+    progress: &Progress,
+) -> Result<Optimised, EngineError> {
+    let pinned = shown.drawn.pinned(&session.design().pins);
+    let start = last.map_or(&shown.preview, |l| &l.preview);
+    let mut steps = Steps { layout: with_pins(start, &pinned), energy: None };
+    let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
+        ControlFlow::Continue(()) => Next::Continue,
+        ControlFlow::Break(()) => Next::Finish,
+    };
+    let embedded = weave::optimise(session, &shown.drawn, &pinned, progress, &mut relay);
+    let embedded = embedded.map_err(|error| failed(&error, progress))?;
+    Ok(finished(session, &shown.drawn.layout, embedded))
+}
+
+fn failed(error: &EmbeddingError, progress: &Progress) -> EngineError {
+    if progress.is_cancelled() { EngineError::Cancelled } else { EngineError::failed(error.to_string()) }
+}
+
+/// What was shown last, for arcs that cannot be followed for the moment.
+struct Steps {
+    layout: LayoutPreview,
+    /// At the start.
+    energy: Option<f64>,
+}
+
+impl Steps {
+    fn next(&mut self, snapshot: &Snapshot) -> EmbeddingStep {
+        for (node, &position) in self.layout.nodes.iter_mut().zip(&snapshot.nodes) {
+            node.position = position;
+        }
+        for (arc, points) in self.layout.arcs.iter_mut().zip(&snapshot.arcs) {
+            if let Some(points) = points {
+                arc.points.clone_from(points);
+            }
+        }
+        let first = *self.energy.get_or_insert(snapshot.energy);
+        let energy = if first > 0.0 { snapshot.energy / first } else { 1.0 };
+        EmbeddingStep { step: snapshot.step, energy, flipped: snapshot.flipped, layout: self.layout.clone() }
+    }
+}
+
+fn finished(session: &Session, layout: &QuadLayout, embedded: Embedded) -> Optimised {
+    let model = session.model();
+    let bending = face_curvature(&model.mesh, &model.curvature, |_| true);
+    let (_, patches, triangles) = measure_patches(&embedded.maps, &bending);
+    let report = &embedded.report;
+    let summary = EmbeddingSummary {
+        steps: report.steps,
+        energy: [report.energy_before, report.energy_after],
+        flipped: [report.flipped_before, report.folds.len()],
+        conformal: report.measures.conformal,
+        alignment: report.measures.alignment,
+        planar: report.measures.planar,
+        aspect: most_oblong(&embedded.maps, &patches),
+        folds: folds(report.folds.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)))),
+        triangles: on_surface(model.mesh.n_faces(), &embedded.maps, &triangles),
+    };
+    let (nodes, arcs) = drawing(&embedded.embedding);
+    Optimised { preview: preview(layout, &nodes, arcs.into_iter()), summary: Arc::new(summary), embedded }
+}
+
+fn drawing(embedding: &Embedding) -> (Vec<DVec3>, Vec<Vec<DVec3>>) {
+    let position = |&v: &u32| embedding.mesh.positions[v as usize];
+    let arcs = embedding.arcs.iter().map(|a| a.iter().map(position).collect());
+    (embedding.nodes.iter().map(position).collect(), arcs.collect())
+}
+
+/// The aspect of the most oblong patch, and the triangle corner in its middle.
+fn most_oblong(maps: &[PatchMap], patches: &[PatchMeasures]) -> (f64, DVec3) {
+    let worst = (0..patches.len()).max_by(|&i, &j| patches[i].aspect.total_cmp(&patches[j].aspect));
+    let Some(worst) = worst else { return (1.0, DVec3::ZERO) };
+    let (map, aspect) = (&maps[worst], patches[worst].aspect);
+    let from_middle = |v: usize| map.uv[v].distance_squared(0.5 * map.size);
+    let middle = (0..map.uv.len()).min_by(|&a, &b| from_middle(a).total_cmp(&from_middle(b)));
+    (aspect, middle.map_or(DVec3::ZERO, |v| map.mesh.positions()[v]))
+}
+
+/// One remark for each reason, with the first place.
+fn folds<'a>(all: impl Iterator<Item = (&'a str, DVec3)>) -> Vec<Remark> {
+    let mut groups: Vec<(&str, usize, DVec3)> = Vec::new();
+    for (reason, place) in all {
+        match groups.iter_mut().find(|g| g.0 == reason) {
+            Some(group) => group.1 += 1,
+            None => groups.push((reason, 1, place)),
+        }
+    }
+    let remark = |(reason, n, place): (&str, usize, DVec3)| {
+        let triangles = if n == 1 { "triangle is" } else { "triangles are" };
+        Remark { color: RegionColor::Red, text: format!("{n} {triangles} folded: {reason}"), place: Some(place) }
+    };
+    groups.into_iter().map(remark).collect()
+}
+
+/// The means over the parts of each triangle of the surface, weighted by area.
+fn on_surface(n_faces: usize, maps: &[PatchMap], triangles: &[Vec<TriangleMeasure>]) -> Vec<TriangleDistortion> {
+    let none = TriangleDistortion { conformal: 0.0, deviation: 0.0, anisotropy: 0.0, flipped: false };
+    let mut sums = vec![(0.0, none); n_faces];
+    let (mut total, mut square) = (0.0, 0.0);
+    for (map, measures) in maps.iter().zip(triangles) {
+        for (&base, m) in map.base_face.iter().zip(measures) {
+            let (area, sum) = &mut sums[base as usize];
+            *area += m.area;
+            sum.conformal += m.area * m.conformal;
+            sum.deviation += m.area * m.deviation;
+            // The measure is the square of the difference of curvatures.
+            sum.anisotropy += m.area * m.anisotropy.sqrt();
+            sum.flipped |= m.flipped;
+            total += m.area;
+            square += m.area * m.anisotropy;
+        }
+    }
+    let full = PRONOUNCED * (square / f64::max(total, f64::MIN_POSITIVE)).sqrt();
+    let mean = |(area, sum): (f64, TriangleDistortion)| {
+        let over = |x: f64| if area > 0.0 { x / area } else { 0.0 };
+        TriangleDistortion {
+            conformal: over(sum.conformal).max(2.0),
+            deviation: over(sum.deviation),
+            anisotropy: if full > 0.0 { (over(sum.anisotropy) / full).min(1.0) } else { 0.0 },
+            flipped: sum.flipped,
+        }
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+    use plait_core::mesh::TriMesh;
+
+    #[test]
+    fn triangles_of_the_surface_take_the_mean_of_their_parts() {
+        let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.5, 0.5, 0.0)];
+        let mesh = TriMesh::from_faces(points.to_vec(), &[[0, 1, 3], [0, 3, 2]]).unwrap();
+        let map = PatchMap {
+            whole: vec![0, 1, 2, 3],
+            base_face: vec![1, 1],
+            uv: points.iter().map(|p| DVec2::new(p.x, p.y)).collect(),
+            size: DVec2::ONE,
+            flipped: 0,
+            mesh,
+        };
+        let part = |area, conformal, flipped| TriangleMeasure {
+            area,
+            conformal,
+            deviation: 10.0,
+            torsion: 0.0,
+            anisotropy: 4.0,
+            flipped,
+        };
+        let on = on_surface(2, &[map], &[vec![part(1.0, 2.0, false), part(3.0, 4.0, true)]]);
+        assert_eq!(on[1], TriangleDistortion { conformal: 3.5, deviation: 10.0, anisotropy: 1.0, flipped: true });
+        assert_eq!((on[0].conformal, on[0].flipped), (2.0, false));
+    }
+
+    #[test]
+    fn folds_are_counted_by_reason() {
+        let all = [("too narrow", DVec3::X), ("fixed", DVec3::Y), ("too narrow", DVec3::Z)];
+        let remarks = folds(all.into_iter());
+        let texts: Vec<_> = remarks.iter().map(|r| r.text.as_str()).collect();
+        assert_eq!(texts, ["2 triangles are folded: too narrow", "1 triangle is folded: fixed"]);
+        assert_eq!(remarks[0].place, Some(DVec3::X));
+    }
+}

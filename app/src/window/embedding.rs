@@ -1,0 +1,206 @@
+//! The panel of the optimised embedding, and the legend of its colours.
+
+use egui::{Align, Align2, Color32, Frame, Layout, Margin, Mesh, RichText, Stroke, Ui, pos2, vec2};
+
+use super::action::Action;
+use super::panels::{remark_row, wide_button};
+use super::{PlaitApp, theme};
+use crate::distortion::{self, Colours};
+use crate::engine::{EmbeddingSummary, LayoutPart, LayoutPreview, Scene};
+use crate::worker::Running;
+
+/// The button, or the progress of the work; then what was achieved.
+pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
+    if let Some(running) = app.optimisation() {
+        in_progress(app, &running, ui, actions);
+        return;
+    }
+    let again = scene.embedding.is_some();
+    let text = if again { "Optimise again" } else { "Optimise" };
+    let hint = if scene.exportable {
+        "Moves nodes and arcs so that patches follow the shape with little distortion and without folds (M)"
+    } else {
+        "Moves nodes and arcs, once the layout is valid"
+    };
+    if wide_button(ui, text, false, scene.exportable, hint) {
+        actions.push(Action::Optimise);
+    }
+    pins(app.layout(), ui, actions);
+    if let Some(summary) = &scene.embedding {
+        figures(summary, ui, actions);
+        colours(app, ui, actions);
+    }
+}
+
+fn in_progress(app: &PlaitApp, running: &Running, ui: &mut Ui, actions: &mut Vec<Action>) {
+    let (stage, fraction) = running.progress.state();
+    let stopping = running.stop.as_ref().is_some_and(|s| s.load(std::sync::atomic::Ordering::Relaxed));
+    let stage = if stopping { "Finishing the best so far" } else { stage.as_str() };
+    ui.label(if stage.is_empty() { "Optimising" } else { stage });
+    ui.add(egui::ProgressBar::new(fraction as f32).desired_height(6.0).fill(theme::ACCENT));
+    let text = app.step.as_ref().map_or_else(String::new, |s| {
+        let folded = if s.flipped == 1 { "triangle" } else { "triangles" };
+        format!("Step {} · energy {:.0} % · {} folded {folded}", s.step, 100.0 * s.energy, s.flipped)
+    });
+    ui.label(RichText::new(text).color(theme::QUIET));
+    ui.horizontal(|ui| {
+        let stop = egui::Button::new("Stop").min_size(vec2(0.5 * (ui.available_width() - 8.0), 32.0));
+        let can_stop = app.step.is_some() && !stopping;
+        if ui.add_enabled(can_stop, stop).on_hover_text("Keeps the best embedding so far (M)").clicked() {
+            actions.push(Action::Stop);
+        }
+        let cancel = egui::Button::new("Cancel").min_size(vec2(ui.available_width(), 32.0));
+        if ui.add(cancel).on_hover_text("Drops what was done (Escape)").clicked() {
+            actions.push(Action::Cancel);
+        }
+    });
+}
+
+/// How many parts are pinned.
+fn pins(layout: Option<&LayoutPreview>, ui: &mut Ui, actions: &mut Vec<Action>) {
+    let pinned = layout.map(LayoutPreview::pinned).unwrap_or_default();
+    if layout.is_none() {
+        return;
+    }
+    if pinned.is_empty() {
+        let hint = "Click on nodes and arcs to pin them where they are.";
+        ui.label(RichText::new(hint).size(13.0).color(theme::QUIET));
+        return;
+    }
+    let nodes = pinned.iter().filter(|p| matches!(p, LayoutPart::Node(_))).count();
+    let count = |n: usize, one: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {one}")),
+        n => Some(format!("{n} {one}s")),
+    };
+    let parts: Vec<String> = [count(nodes, "node"), count(pinned.len() - nodes, "arc")].into_iter().flatten().collect();
+    ui.horizontal(|ui| {
+        ui.label(format!("Pinned: {}", parts.join(", ")));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("Unpin all").clicked() {
+                actions.push(Action::UnpinAll);
+            }
+        });
+    });
+}
+
+fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
+    let card = Frame::new()
+        .fill(theme::RAISED)
+        .stroke(Stroke::new(1.0, theme::LINE))
+        .corner_radius(8.0)
+        .inner_margin(Margin::symmetric(12, 8));
+    card.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        egui::Grid::new("embedding").num_columns(2).spacing([14.0, 1.0]).show(ui, |ui| {
+            let mut row = |name: &str, value: String, hover: &str| {
+                ui.label(RichText::new(name).color(theme::QUIET)).on_hover_text(hover);
+                ui.label(value).on_hover_text(hover);
+                ui.end_row();
+            };
+            let [before, after] = s.energy.map(significant);
+            row(
+                "Energy",
+                format!("{before} → {after}"),
+                "What is minimised, over the surface's area, before and after",
+            );
+            let [before, after] = s.flipped;
+            row("Folded triangles", format!("{before} → {after}"), "Triangles the map turns over, before and after");
+            row("Conformal distortion", format!("{:.3}", s.conformal), "E_confor: 2 where angles are kept");
+            row("Off alignment", format!("{:.1}°", s.alignment), "E°: mean angle to the nearest principal direction");
+            row("Planarity error", significant(s.planar), "E_planar: 0 where quads are flat");
+        });
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Most oblong patch").color(theme::QUIET));
+            let (aspect, place) = s.aspect;
+            let text = RichText::new(format!("1 : {aspect:.1}")).color(theme::ACCENT);
+            let link = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
+            if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
+                actions.push(Action::LookAt(place));
+            }
+        });
+        let [r, g, b] = distortion::FOLDED;
+        for fold in &s.folds {
+            remark_row(fold, Color32::from_rgb(r, g, b), ui, actions);
+        }
+    });
+}
+
+/// What the surface's colours tell.
+fn colours(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let label = ui.label(RichText::new("Colours").color(theme::QUIET));
+        let mut chosen = app.colours();
+        let choice = egui::ComboBox::from_id_salt("colours").width(ui.available_width()).selected_text(chosen.label());
+        let response = choice.show_ui(ui, |ui| {
+            for colours in Colours::ALL {
+                ui.selectable_value(&mut chosen, colours, colours.label());
+            }
+        });
+        response.response.labelled_by(label.id);
+        if chosen != app.colours() {
+            actions.push(Action::Colours(chosen));
+        }
+    });
+}
+
+/// The scale of the colours, over the view.
+pub fn legend(app: &PlaitApp, ctx: &egui::Context) {
+    let colours = app.colours();
+    let Some(summary) = app.summary().filter(|_| colours != Colours::Regions) else { return };
+    let area = egui::Area::new(egui::Id::unique("legend")).anchor(Align2::LEFT_BOTTOM, vec2(14.0, -50.0));
+    area.interactable(false).show(ctx, |ui| {
+        super::panels::floating(theme::RAISED, theme::LINE).show(ui, |ui| {
+            ui.set_width(LEGEND_WIDTH);
+            ui.label(RichText::new(colours.label()).strong());
+            scale(colours, ui);
+            ui.label(RichText::new(colours.meaning()).size(12.0).color(theme::QUIET));
+            if summary.triangles.iter().any(|t| t.flipped) {
+                ui.horizontal(|ui| {
+                    let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
+                    let [r, g, b] = distortion::FOLDED;
+                    ui.painter().rect_filled(rect, 2.0, Color32::from_rgb(r, g, b));
+                    ui.label(RichText::new("folded").size(12.0).color(theme::QUIET));
+                });
+            }
+        });
+    });
+}
+
+const LEGEND_WIDTH: f32 = 250.0;
+
+/// A bar in the colours of the scale with its numbers below.
+fn scale(colours: Colours, ui: &mut Ui) {
+    const STEPS: u32 = 48;
+    let (rect, _) = ui.allocate_exact_size(vec2(LEGEND_WIDTH, 32.0), egui::Sense::hover());
+    let bar = egui::Rect::from_min_size(rect.min + vec2(4.0, 2.0), vec2(LEGEND_WIDTH - 20.0, 12.0));
+    let x = |t: f64| bar.min.x + bar.width() * t as f32;
+    let mut mesh = Mesh::default();
+    for i in 0..=STEPS {
+        let t = f64::from(i) / f64::from(STEPS);
+        let [r, g, b] = distortion::color(t);
+        for y in [bar.min.y, bar.max.y] {
+            mesh.colored_vertex(pos2(x(t), y), Color32::from_rgb(r, g, b));
+        }
+    }
+    for i in 0..STEPS {
+        let k = 2 * i;
+        mesh.add_triangle(k, k + 1, k + 2);
+        mesh.add_triangle(k + 1, k + 3, k + 2);
+    }
+    ui.painter().add(mesh);
+    ui.painter().rect_stroke(bar, 0.0, Stroke::new(1.0, theme::LINE), egui::StrokeKind::Outside);
+    for &(t, text) in colours.ticks() {
+        let foot = pos2(x(t), bar.max.y);
+        ui.painter().line_segment([foot, foot + vec2(0.0, 3.0)], Stroke::new(1.0, theme::QUIET));
+        let align = if t == 0.0 { Align2::LEFT_TOP } else { Align2::CENTER_TOP };
+        let at = foot + vec2(if t == 0.0 { -4.0 } else { 0.0 }, 3.0);
+        ui.painter().text(at, align, text, egui::FontId::proportional(12.0), theme::TEXT);
+    }
+}
+
+/// Three significant digits.
+fn significant(value: f64) -> String {
+    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{value:.digits$}")
+}

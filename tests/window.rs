@@ -1,12 +1,16 @@
 //! The whole window without a display: drawn by a software driver, driven through its widget tree and pointer.
 
+#[path = "support/stand_in.rs"]
+mod stand_in;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Modifiers, PointerButton, pos2, vec2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
-use plait_app::engine::Source;
+use egui_kittest::kittest::{NodeT as _, Queryable};
+use plait_app::distortion::Colours;
+use plait_app::engine::{LayoutPart, Opener, Source};
 use plait_app::weaving::SessionOpener;
 use plait_app::window::PlaitApp;
 
@@ -16,12 +20,16 @@ const PATIENCE: Duration = Duration::from_secs(60);
 type Window = Harness<'static, PlaitApp>;
 
 fn open(model: &str) -> Window {
+    open_with(Arc::new(SessionOpener), model)
+}
+
+fn open_with(opener: Arc<dyn Opener>, model: &str) -> Window {
     let source = Source::BuiltIn(model.to_owned());
     let mut window = Harness::builder()
         .with_size(vec2(1100.0, 700.0))
         .with_max_steps(8)
         .wgpu()
-        .build_eframe(move |cc| PlaitApp::new(cc, Arc::new(SessionOpener), Some(source)).unwrap());
+        .build_eframe(move |cc| PlaitApp::new(cc, opener, Some(source)).unwrap());
     wait(&mut window, |app| app.scene().is_some());
     window
 }
@@ -157,4 +165,137 @@ fn the_picture_shows_a_lit_surface() {
     view.for_each(|(_, _, p)| levels[usize::from(p[0]) / 16] += 1);
     let used = levels.iter().filter(|&&n| n > 500).count();
     assert!(used >= 5, "grey levels: {levels:?}");
+}
+
+/// Frames until `done` holds, while the worker may go on.
+fn until(window: &mut Window, done: impl Fn(&PlaitApp) -> bool) {
+    let start = Instant::now();
+    while !done(window.state()) {
+        assert!(start.elapsed() < PATIENCE, "the window did not get there");
+        window.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    window.run_steps(2);
+}
+
+/// The stand-in with one strip and its layout.
+fn with_layout() -> Window {
+    let mut window = open_with(Arc::new(stand_in::StandIn), "stand-in");
+    window.key_press(egui::Key::S);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.layout.is_some()));
+    window
+}
+
+/// How far the first node has come along.
+fn first_node(app: &PlaitApp) -> f64 {
+    app.layout().map_or(f64::NAN, |l| l.nodes[0].position.x)
+}
+
+fn optimise_and_stop(window: &mut Window) {
+    window.get_by_label("Optimise").click();
+    until(window, |app| first_node(app) > stand_in::moved(3));
+    window.get_by_label("Stop").click();
+    wait(window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
+}
+
+#[test]
+fn only_a_valid_layout_can_be_optimised() {
+    let mut window = open_with(Arc::new(stand_in::StandIn), "stand-in");
+    assert!(window.get_by_label("Optimise").accesskit_node().is_disabled());
+    window.key_press(egui::Key::S);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.exportable));
+    assert!(!window.get_by_label("Optimise").accesskit_node().is_disabled());
+}
+
+#[test]
+fn an_optimisation_is_watched_stopped_and_kept() {
+    let mut window = with_layout();
+    window.get_by_label("Optimise").click();
+    until(&mut window, |app| first_node(app) > stand_in::moved(0));
+    // The scene is still that of before; the picture runs ahead.
+    assert_eq!(window.state().scene().unwrap().layout.as_ref().unwrap().nodes[0].position.x, stand_in::moved(0));
+    assert!(window.query_by_label("Optimise").is_none());
+    window.get_by_label_contains("3 folded triangles");
+    until(&mut window, |app| first_node(app) > stand_in::moved(5));
+    window.get_by_label("Stop").click();
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
+    assert!(first_node(window.state()) > stand_in::moved(5));
+    window.get_by_label("0.500 to 0.250");
+    window.get_by_label("3 to 0");
+    window.get_by_label("7.5° off");
+    window.get_by_label("Optimise again");
+}
+
+#[test]
+fn escape_undo_and_edits_drop_what_is_being_optimised() {
+    let keys = [(egui::Key::Escape, Modifiers::NONE, 1), (egui::Key::Z, Modifiers::COMMAND, 1)];
+    for (key, modifiers, strips) in keys.into_iter().chain([(egui::Key::S, Modifiers::NONE, 2)]) {
+        let mut window = with_layout();
+        window.get_by_label("Optimise").click();
+        until(&mut window, |app| first_node(app) > stand_in::moved(2));
+        window.key_press_modifiers(modifiers, key);
+        wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == strips));
+        let app = window.state();
+        assert!(app.scene().unwrap().embedding.is_none() && first_node(app) == stand_in::moved(0), "{key:?}");
+        window.get_by_label("Optimising the embedding: cancelled");
+    }
+}
+
+#[test]
+fn other_strips_forget_the_optimised_embedding_and_say_so() {
+    let mut window = with_layout();
+    optimise_and_stop(&mut window);
+    window.key_press(egui::Key::S);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
+    assert!(window.state().scene().unwrap().embedding.is_none());
+    window.get_by_label_contains("the optimised embedding is gone");
+    window.get_by_label("Optimise");
+}
+
+#[test]
+fn clicks_on_nodes_and_arcs_pin_them_and_let_them_go() {
+    let mut window = with_layout();
+    let layout = window.state().layout().unwrap().clone();
+    let middle = layout.arcs[0].points[10];
+    let arc = [(LayoutPart::Arc(0), middle, "Pinned: 1 arc")];
+    let nodes = [(LayoutPart::Node(1), layout.nodes[1].position, "Pinned: 1 node")];
+    for (part, place, text) in nodes.into_iter().chain(arc) {
+        let at = window.state().on_screen(place).unwrap();
+        window.hover_at(at);
+        wait(&mut window, |app| app.pinnable() == Some(part));
+        // What a click would do is clear: no strip is offered.
+        assert_eq!(window.state().offered().0, 0);
+        click(&mut window, at);
+        wait(&mut window, |app| app.layout().and_then(|l| l.is_pinned(part)) == Some(true));
+        window.get_by_label(text);
+        click(&mut window, at);
+        wait(&mut window, |app| app.layout().is_some_and(|l| l.pinned().is_empty()));
+    }
+    assert_eq!(strips(&window), 1);
+    let at = window.state().on_screen(middle).unwrap();
+    click(&mut window, at);
+    wait(&mut window, |app| app.layout().is_some_and(|l| l.pinned().len() == 1));
+    window.get_by_label("Unpin all").click();
+    wait(&mut window, |app| app.layout().is_some_and(|l| l.pinned().is_empty()));
+}
+
+#[test]
+fn the_surface_takes_the_colours_that_are_chosen() {
+    let mut window = with_layout();
+    assert!(window.query_by_label("Colours").is_none());
+    optimise_and_stop(&mut window);
+    let plain = window.render().unwrap();
+    window.get_by_role(egui::accesskit::Role::ComboBox).click();
+    window.run_steps(4);
+    window.get_by_label("Alignment").click();
+    window.run_steps(6);
+    assert_eq!(window.state().colours(), Colours::Alignment);
+    window.get_by_label_contains("Degrees off the nearest");
+    let picture = window.render().unwrap();
+    // Half of the triangles are at the dark red end of the scale.
+    let red = |p: &image::RgbaImage| p.pixels().filter(|p| p[0] > 60 && p[1] < p[0] / 2 && p[2] < p[0] / 2).count();
+    assert!(red(&picture) > red(&plain) + 5000, "{} {}", red(&picture), red(&plain));
+    window.key_press(egui::Key::S);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
+    assert_eq!(window.state().colours(), Colours::Regions);
 }

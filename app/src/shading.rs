@@ -184,7 +184,7 @@ fn draw_layout(layout: &LayoutPreview, part: Option<LayoutPart>, lines: &mut Vec
         };
         let position = node.position.as_vec3().to_array();
         // Large enough for the square's core to be seen.
-        let radius = if node.pinned { radius.max(5.6) } else { radius };
+        let radius = if node.pinned { 6.6 } else { radius };
         let marker = Marker { position, color, radius, hidden: 0.12, square: node.pinned };
         if part == Some(LayoutPart::Node(i)) {
             markers.push(Marker { color: PROPOSED, radius: radius + 4.0, ..marker.clone() });

@@ -7,17 +7,15 @@ use glam::DVec3;
 use plait_core::embed::{
     Embedded, EmbeddingError, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature, measure_patches,
 };
-use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout, map_patches};
+use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::progress::Progress;
-use plait_core::weave::{self, Drawn, Pin, PinnedParts, QuadSize, Session, WeaveError};
+use plait_core::weave::{self, Drawn, Pin, PinnedParts, Session, WeaveError};
 
 use crate::engine::{
     EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColor, Remark,
     TriangleDistortion,
 };
 
-/// Quads behind the preview of a layout: its arcs are those of the exported quads, at half their fineness.
-const PREVIEW_QUADS: u32 = 3000;
 /// Difference of the principal curvatures, as a fraction of its root mean square over the surface, from which on
 /// principal directions count as fully pronounced.
 const PRONOUNCED: f64 = 0.5;
@@ -38,15 +36,9 @@ pub struct Optimised {
 impl Shown {
     /// Draws the layout of a session.
     pub fn new(session: &Session, progress: &Progress) -> Result<Self, WeaveError> {
-        let Drawn { layout, embedding } = weave::draw(session, progress)?;
-        let maps = map_patches(&layout, &embedding, progress)?;
-        let options = weave::ExportOptions { size: QuadSize::Count(PREVIEW_QUADS) };
-        let export = weave::export_embedded(session, layout, embedding, maps, &options, progress)?;
-        let quads = &export.quads;
-        let arc = |arc: &Vec<u32>| arc.iter().map(|&v| quads.positions[v as usize]).collect();
-        let nodes = quads.positions[..quads.n_nodes].to_vec();
-        let preview = preview(&export.layout, &nodes, quads.arcs.iter().map(arc));
-        Ok(Self { drawn: Drawn { layout: export.layout, embedding: export.embedding }, preview })
+        let drawn = weave::draw(session, progress)?;
+        let (nodes, arcs) = drawing(&drawn.embedding);
+        Ok(Self { preview: preview(&drawn.layout, &nodes, arcs.into_iter()), drawn })
     }
 }
 
@@ -93,13 +85,26 @@ pub fn optimise(
 ) -> Result<Optimised, EngineError> {
     let pinned = shown.drawn.pinned(&session.design().pins);
     let start = last.map_or(&shown.preview, |l| &l.preview);
-    let mut steps = Steps { layout: with_pins(start, &pinned), energy: None };
-    let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
-        ControlFlow::Continue(()) => Next::Continue,
-        ControlFlow::Break(()) => Next::Finish,
+    let layout = with_pins(start, &pinned);
+    let mut from = |drawn: &Drawn| {
+        let mut steps = Steps { layout: layout.clone(), energy: None };
+        let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
+            ControlFlow::Continue(()) => Next::Continue,
+            ControlFlow::Break(()) => Next::Finish,
+        };
+        weave::optimise(session, drawn, &pinned, progress, &mut relay).map_err(|error| failed(&error, progress))
     };
-    let embedded = weave::optimise(session, &shown.drawn, &pinned, progress, &mut relay);
-    let embedded = embedded.map_err(|error| failed(&error, progress))?;
+    let again = last.map(|l| Drawn { layout: shown.drawn.layout.clone(), embedding: l.embedded.embedding.clone() });
+    let embedded = match again.as_ref().map(&mut from) {
+        // Pinned parts are to stay where they are now, not where the first drawing had them.
+        Some(Ok(embedded)) => embedded,
+        Some(Err(EngineError::Cancelled)) => return Err(EngineError::Cancelled),
+        Some(Err(error)) => {
+            tracing::debug!(%error, "the optimisation starts again from the first drawing");
+            from(&shown.drawn)?
+        }
+        None => from(&shown.drawn)?,
+    };
     Ok(finished(session, &shown.drawn.layout, embedded))
 }
 

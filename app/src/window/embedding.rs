@@ -105,13 +105,15 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
                 "What is minimised, over the surface's area, before and after",
             );
             let [before, after] = s.flipped;
-            row("Folded triangles", format!("{before} → {after}"), "Triangles the map turns over, before and after");
-            row("Conformal distortion", format!("{:.3}", s.conformal), "E_confor: 2 where angles are kept");
-            row("Off alignment", format!("{:.1}°", s.alignment), "E°: mean angle to the nearest principal direction");
-            row("Planarity error", significant(s.planar), "E_planar: 0 where quads are flat");
-        });
-        ui.horizontal(|ui| {
-            ui.label(RichText::new("Most oblong patch").color(theme::QUIET));
+            row("Folded triangles", format!("{before} to {after}"), "Triangles the map turns over, before and after");
+            row(
+                "Conformal",
+                format!("{:.3}", s.conformal),
+                "E_confor, mean conformal distortion: 2 where angles are kept",
+            );
+            row("Alignment", format!("{:.1}° off", s.alignment), "E°: mean angle to the nearest principal direction");
+            row("Planarity", significant(s.planar), "E_planar: 0 where quads along the isolines are flat");
+            ui.label(RichText::new("Worst aspect").color(theme::QUIET)).on_hover_text("Of the most oblong patch");
             let (aspect, place) = s.aspect;
             let text = RichText::new(format!("1 : {aspect:.1}")).color(theme::ACCENT);
             let link = ui.add(egui::Label::new(text).sense(egui::Sense::click()));

@@ -72,6 +72,7 @@ pub struct PlaitApp {
     dialogs: Dialogs,
     quads: usize,
     view_size: Vec2,
+    view_corner: egui::Pos2,
     frame_pending: bool,
     shortcuts_open: bool,
     about_open: bool,
@@ -116,6 +117,7 @@ impl PlaitApp {
             dialogs: Dialogs::default(),
             quads: DEFAULT_QUADS,
             view_size: Vec2::new(1.0, 1.0),
+            view_corner: egui::Pos2::ZERO,
             frame_pending: false,
             shortcuts_open: false,
             about_open: false,
@@ -167,6 +169,12 @@ impl PlaitApp {
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// Where a point of the model appears in the window; `None` behind the viewer.
+    pub fn on_screen(&self, point: DVec3) -> Option<egui::Pos2> {
+        let at = self.camera.project(point.as_vec3(), self.view_size)?;
+        Some(self.view_corner + egui::vec2(at.x, at.y))
     }
 
     /// Whether the worker has nothing to do and all it answered was taken in by a frame.

@@ -133,7 +133,9 @@ pub fn show(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
     let side = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(16, 14));
     egui::Panel::right("design").frame(side).default_size(300.0).size_range(250.0..=460.0).show(ui, |ui| {
         match app.scene.as_deref() {
-            Some(scene) => side_panel(app, scene, ui, actions),
+            Some(scene) => {
+                egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| side_panel(app, scene, ui, actions));
+            }
             None => drop(ui.label(RichText::new("No model is open").color(theme::QUIET))),
         }
     });
@@ -261,12 +263,10 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
         let hint = "Move over the surface, choose with the wheel, place with a click.";
         ui.label(RichText::new(hint).color(theme::QUIET));
     }
-    egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 2.0;
-        for (i, strip) in scene.strips.iter().enumerate() {
-            strip_row(app, i, strip, ui, actions);
-        }
-    });
+    ui.spacing_mut().item_spacing.y = 2.0;
+    for (i, strip) in scene.strips.iter().enumerate() {
+        strip_row(app, i, strip, ui, actions);
+    }
 }
 
 /// How many quads, and the button.

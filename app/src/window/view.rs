@@ -124,6 +124,7 @@ impl Prepared {
 pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
     app.view_size = Vec2::new(rect.width(), rect.height());
+    app.view_corner = rect.min;
     if std::mem::take(&mut app.frame_pending) {
         app.frame_all();
     }

@@ -1,15 +1,17 @@
 //! Where regular nodes belong: at the crossing of their two isolines.
 //!
 //! The map tells on which isolines the irregular nodes at both ends of a regular node's chains lie. By how much its own
-//! coordinates miss these is a step in the map, and the map's gradients turn it into a step on the surface.
+//! coordinates miss these is a step in the map, and the map's gradients turn it into a step on the surface. On a chain
+//! without irregular nodes all nodes come to the mean of their isolines.
 
 use glam::DVec2;
 
 use super::net::{Net, jump_across};
+use super::spacing::transition;
 use super::straight::{Crossroads, around};
 use crate::field::Metric;
-use crate::mesh::{HalfedgeId, TriMesh};
-use crate::param::{SeamlessMap, Transition};
+use crate::mesh::HalfedgeId;
+use crate::param::SeamlessMap;
 
 /// The step, as a vector in the plane of the layout of the triangle of the half-edge returned, that brings a regular
 /// node to the crossing of its isolines; `None` where the map does not tell.
@@ -21,25 +23,28 @@ pub(super) fn step_to_crossing(
     ends: &[(u32, bool)],
 ) -> Option<(HalfedgeId, DVec2)> {
     let mesh = &net.mesh;
-    let mut first: Option<HalfedgeId> = None;
-    // The nearest held node tells best: the shortest chain for each coordinate.
-    let mut missing: [Option<(usize, f64)>; 2] = [None; 2];
+    let corner = roads.corner(net, *ends.first()?);
+    // For each coordinate what a held node says, the one by the shortest chain, and the sum of what others say.
+    let mut held: [Option<(usize, f64)>; 2] = [None; 2];
+    let mut others = [(0.0, 1.0); 2];
     for &end in ends {
-        let Some(chain) = roads.way(net, end) else { continue };
-        let corner = *first.get_or_insert(chain.start);
-        let mut crossed = around(mesh, corner, chain.start)?;
-        let turns: i32 = crossed.iter().map(|&h| jump_across(mesh, &net.jump, h)).sum();
-        let heading = (i32::from(chain.heading) + turns).rem_euclid(4);
-        crossed.extend(&chain.crossed);
-        let there = transition(mesh, map, &crossed)?.inverse().apply(at(map, chain.end));
-        let axis = if heading % 2 == 0 { 1 } else { 0 };
-        let off = (there - at(map, corner))[axis];
-        if missing[axis].is_none_or(|(n, _)| crossed.len() < n) {
-            missing[axis] = Some((crossed.len(), off));
+        for (chain, node) in roads.ways(net, end) {
+            let mut crossed = around(mesh, corner, chain.start)?;
+            let turns: i32 = crossed.iter().map(|&h| jump_across(mesh, &net.jump, h)).sum();
+            let heading = (i32::from(chain.heading) + turns).rem_euclid(4);
+            crossed.extend(&chain.crossed);
+            let there = transition(mesh, map, &crossed)?.inverse().apply(at(map, chain.end));
+            let axis = if heading % 2 == 0 { 1 } else { 0 };
+            let off = (there - at(map, corner))[axis];
+            if !roads.held[node] {
+                others[axis] = (others[axis].0 + off, others[axis].1 + 1.0);
+            } else if held[axis].is_none_or(|(n, _)| crossed.len() < n) {
+                held[axis] = Some((crossed.len(), off));
+            }
         }
     }
-    let corner = first?;
-    let off = DVec2::new(missing[0].map_or(0.0, |m| m.1), missing[1].map_or(0.0, |m| m.1));
+    let off = [0, 1].map(|axis| held[axis].map_or(others[axis].0 / others[axis].1, |m| m.1));
+    let off = DVec2::from_array(off);
     let [u, v] = map.gradients(metric, mesh.face(corner));
     let area = u.perp_dot(v);
     // Where the map is folded or flat its gradients tell nothing.
@@ -51,8 +56,4 @@ const FLAT: f64 = 0.05;
 
 fn at(map: &SeamlessMap, corner: HalfedgeId) -> DVec2 {
     map.uv[corner.index() / 3][corner.index() % 3]
-}
-
-fn transition(mesh: &TriMesh, map: &SeamlessMap, crossed: &[HalfedgeId]) -> Option<Transition> {
-    crossed.iter().try_fold(Transition::IDENTITY, |t, &h| Some(t.then(&map.transition(mesh, h)?)))
 }

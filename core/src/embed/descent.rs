@@ -15,11 +15,12 @@ use super::net::Net;
 use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::sizing::{SizingSystem, rest_turns};
-use super::straight::{ArcEnd, Crossroads, corner};
-use super::{EmbeddingError, voronoi};
+use super::spacing::Spacing;
+use super::straight::{ArcEnd, Crossroads};
+use super::{EmbeddingError, alignment, voronoi};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
-use crate::mesh::{HalfedgeId, TriMesh, VertexId};
-use crate::param::{Fold, Objective, Relation, SeamlessSystem, Solution};
+use crate::mesh::{TriMesh, VertexId};
+use crate::param::{Fold, Objective, SeamlessSystem, Solution};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
@@ -38,6 +39,11 @@ const DRAWN: f64 = 0.5;
 /// Rounds of guiding the first field, in each of which more directions come to agree.
 const FIRST_ROUNDS: usize = 4;
 
+/// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
+const ALIKE: f64 = 0.3;
+/// By what a step is then lengthened, and how far at most.
+const LONGER: f64 = 1.4;
+const LONGEST: f64 = 6.0;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
 
@@ -65,12 +71,14 @@ pub struct Settings {
     pub anisotropy: f64,
     /// Whether lengths may vary over the surface as the field wants it.
     pub sizing: bool,
+    /// Least length of an arc in the map, in mean edges of the mesh.
+    pub spacing: f64,
 }
 
 impl Default for Settings {
-    /// Those of the thesis (sections 6.4.3 and 6.5.1).
+    /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
     fn default() -> Self {
-        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true }
+        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true, spacing: 1.5 }
     }
 }
 
@@ -96,14 +104,21 @@ pub struct Optimizer<'a> {
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
     roads: Crossroads,
+    /// Chords held at the least length, the chord of every arc, and that length.
+    spacing: Spacing,
+    chord_of: Vec<u32>,
+    least: f64,
     /// The ends of arcs at each node.
     ends: Vec<Vec<ArcEnd>>,
     guided: GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
     state: State,
-    /// Factor of all steps.
-    pace: f64,
+    /// Factor of the steps of every node.
+    pace: Vec<f64>,
+    /// Where every node was headed when it last moved.
+    heading: Vec<DVec3>,
+    /// Steps taken back since one was made.
     halved: usize,
     steps: usize,
 }
@@ -135,12 +150,17 @@ impl<'a> Optimizer<'a> {
             surface.curvature[at.nearest_vertex(surface.mesh).index()]
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
+        let spacing = Spacing::none(layout.chords);
+        let mean_edge = net.mesh.edges().map(|e| net.mesh.edge_length(e)).sum::<f64>() / net.mesh.n_edges() as f64;
+        let least = settings.spacing * mean_edge;
         let guided = GuidedSystem::new(&net.mesh)?;
         let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
             curvature: &curvature,
             sharp: &sharp,
             roads: &roads,
+            spacing: &spacing,
+            least,
             guided: &guided,
             seamless: None,
             sizes: None,
@@ -154,12 +174,16 @@ impl<'a> Optimizer<'a> {
             curvature,
             sharp,
             roads,
+            spacing,
+            chord_of: layout.arcs.iter().map(|a| a.chord).collect(),
+            least,
             ends,
             guided,
             seamless,
             sizes,
             state,
-            pace: 1.0,
+            pace: vec![1.0; layout.nodes.len()],
+            heading: vec![DVec3::ZERO; layout.nodes.len()],
             halved: 0,
             steps: 0,
         })
@@ -183,17 +207,50 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`]; the state is then as before.
     pub fn step(&mut self, progress: &Progress) -> Result<bool, EmbeddingError> {
         self.steps += 1;
+        let State { net, solution, .. } = &self.state;
+        let held = self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+        if held > 0 {
+            tracing::debug!(held, "chords held apart");
+            self.state = self.solve(self.state.net.clone(), progress)?;
+        }
         let net = self.moved();
         let next = self.solve(net, progress)?;
         let better = next.solution.energy < self.state.solution.energy;
-        tracing::debug!(step = self.steps, pace = self.pace, energy = next.solution.energy, better, "nodes moved");
+        tracing::debug!(step = self.steps, energy = next.solution.energy, better, "nodes moved");
         if better {
             self.state = next;
+            self.halved = 0;
+            self.adapt();
         } else {
-            self.pace *= 0.5;
+            self.pace.iter_mut().for_each(|p| *p *= 0.5);
             self.halved += 1;
         }
         Ok(better)
+    }
+
+    /// Lengthens the steps of nodes that keep their direction and shortens those of nodes that turn back.
+    fn adapt(&mut self) {
+        for i in 0..self.pace.len() {
+            let heading = self.heading_of(i);
+            let turn = heading.dot(self.heading[i]);
+            if turn > ALIKE {
+                self.pace[i] = (self.pace[i] * LONGER).min(LONGEST);
+            } else if turn < -ALIKE {
+                self.pace[i] *= 0.5;
+            }
+            self.heading[i] = heading;
+        }
+    }
+
+    /// The direction in space in which a node is to move.
+    fn heading_of(&self, i: usize) -> DVec3 {
+        let State { net, metric, field, objective, solution } = &self.state;
+        let v = net.nodes[i].vertex;
+        if !self.roads.held[i] || self.ground.hold[i] == Hold::Fixed {
+            return DVec3::ZERO;
+        }
+        let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
+        if d.is_finite() { self.in_space(&net.mesh, metric, v, d).normalize_or_zero() } else { DVec3::ZERO }
     }
 
     /// The net with every node moved by one step.
@@ -213,7 +270,7 @@ impl<'a> Optimizer<'a> {
                 continue;
             }
             let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
-            let step = d * (STEP * self.pace / steep);
+            let step = d * (STEP * self.pace[i] / steep);
             if !(step.length() > 0.0 && step.is_finite()) {
                 continue;
             }
@@ -275,8 +332,13 @@ impl<'a> Optimizer<'a> {
             self.state = self.solve(net, progress)?;
         }
         self.roads.hold_all();
-        let net = self.state.net.clone();
-        self.state = self.solve(net, progress)?;
+        loop {
+            self.state = self.solve(self.state.net.clone(), progress)?;
+            let State { net, solution, .. } = &self.state;
+            if self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
+                break;
+            }
+        }
         let State { net, metric, field, objective, solution } = &mut self.state;
         let Some(system) = &self.seamless else { return Ok((self.state, Vec::new())) };
         let mut quarters = vec![4; net.mesh.n_vertices()];
@@ -301,6 +363,8 @@ impl<'a> Optimizer<'a> {
             curvature: &self.curvature,
             sharp: &self.sharp,
             roads: &self.roads,
+            spacing: &self.spacing,
+            least: self.least,
             guided: &self.guided,
             seamless: self.seamless.take(),
             sizes: self.sizes.take(),
@@ -334,6 +398,8 @@ struct Solver<'s> {
     curvature: &'s [PrincipalCurvature],
     sharp: &'s [bool],
     roads: &'s Crossroads,
+    spacing: &'s Spacing,
+    least: f64,
     guided: &'s GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
@@ -360,7 +426,8 @@ impl Solver<'_> {
             Vec::new()
         };
         let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
-        let relations = relations(&net, self.roads, &metric, &angle, self.sharp);
+        let mut relations = alignment::relations(&net, self.roads, &metric, &angle, self.sharp);
+        relations.extend(self.spacing.relations(&net, self.roads, self.least));
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let system = match self.seamless.take() {
             Some(mut system) => {
@@ -428,40 +495,6 @@ fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
     let off = (off - off.round()).abs();
     let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
     (share > 0.0).then(|| field::Guide { weight: guide.weight * share, ..*guide })
-}
-
-/// That every arc is an isoline, and every edge of the boundary and of a feature.
-fn relations(net: &Net, roads: &Crossroads, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<Relation> {
-    let mesh = &net.mesh;
-    let along = |k: i32| if k % 2 == 0 { 1 } else { 0 };
-    let mut relations: Vec<Relation> = roads
-        .chains(net)
-        .into_iter()
-        .map(|c| Relation {
-            from: corner(c.start),
-            to: corner(c.end),
-            crossed: c.crossed,
-            axis: along(i32::from(c.heading)),
-            difference: 0.0,
-        })
-        .collect();
-    let on_edge = |h: HalfedgeId, k: i32| Relation {
-        from: corner(h),
-        crossed: Vec::new(),
-        to: corner(mesh.next(h)),
-        axis: along(k),
-        difference: 0.0,
-    };
-    for e in mesh.edges() {
-        let h = mesh.halfedge(e);
-        if let Some(&(k, _)) = net.boundary.get(&h) {
-            relations.push(on_edge(h, i32::from(k)));
-        } else if sharp[e.index()] && !mesh.is_boundary_edge(e) {
-            let turns = (metric.direction(h) - angle[mesh.face(h).index()]) / FRAC_PI_2;
-            relations.push(on_edge(h, (turns.round() as i32).rem_euclid(4)));
-        }
-    }
-    relations
 }
 
 /// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.

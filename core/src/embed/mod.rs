@@ -6,6 +6,7 @@
 //!
 //! The room knows layouts and drawings, not how they came about.
 
+mod alignment;
 mod bending;
 mod cross;
 mod descent;
@@ -22,6 +23,7 @@ mod relocate;
 mod rose;
 mod shift;
 mod sizing;
+mod spacing;
 mod straight;
 mod trace;
 mod voronoi;

@@ -16,7 +16,9 @@ pub(super) type ArcEnd = (u32, bool);
 /// Opposite ends at regular nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Crossroads {
-    /// For each end of an arc (first, second) the end that goes straight on.
+    /// For each end of an arc (first, second) the next one counter-clockwise around the node.
+    next: Vec<[Option<ArcEnd>; 2]>,
+    /// For each end of an arc the end that goes straight on.
     opposite: Vec<[Option<ArcEnd>; 2]>,
     /// For each node whether it is held to its arcs.
     pub held: Vec<bool>,
@@ -55,7 +57,7 @@ impl Crossroads {
             next[b as usize][usize::from(e)]
         };
         let opposite = (0..layout.arcs.len()).map(|a| [false, true].map(|e| straight(a, e))).collect();
-        Self { opposite, held }
+        Self { next, opposite, held }
     }
 
     /// The chains that must be isolines, each once; a closed one ends at the corner it starts at.
@@ -103,12 +105,67 @@ impl Crossroads {
         (list, false)
     }
 
-    /// From the end of an arc at a regular node straight on to the next node that is held, if there is one.
-    pub(super) fn way(&self, net: &Net, end: ArcEnd) -> Option<Chain> {
-        let (list, closed) = self.walk(end);
-        let tail = list.last()?;
-        let node = net.arcs[tail.0 as usize].nodes[usize::from(!tail.1)] as usize;
-        if closed || !self.held[node] { None } else { join(net, &list) }
+    /// From the end of an arc straight on: the chains to all nodes on the way up to the first that is held, or until
+    /// the way ends or closes.
+    pub(super) fn ways(&self, net: &Net, end: ArcEnd) -> Vec<(Chain, usize)> {
+        let (list, _) = self.walk(end);
+        let mut ways: Vec<(Chain, usize)> = Vec::new();
+        for &at in &list {
+            let next = match ways.last() {
+                None => Some(directed(net, at)),
+                Some((before, _)) => extend(net, before.clone(), at),
+            };
+            let Some(chain) = next else { break };
+            ways.push((chain, net.arcs[at.0 as usize].nodes[usize::from(!at.1)] as usize));
+        }
+        ways
+    }
+
+    /// An arc with what tells its length in the map: from a held node on the isoline across its first end to one on the
+    /// isoline across its second. The heading is that of the arc. `None` if an isoline has no held node.
+    pub(super) fn span(&self, net: &Net, a: u32) -> Option<Chain> {
+        let mut list: Vec<ArcEnd> = self.sideways(net, (a, false))?;
+        list.reverse();
+        for end in &mut list {
+            end.1 = !end.1;
+        }
+        let before = join(net, &list);
+        list.push((a, false));
+        list.extend(self.sideways(net, (a, true))?);
+        let whole = join(net, &list)?;
+        let arc = &net.arcs[a as usize];
+        let mut crossed: Vec<HalfedgeId> = Vec::new();
+        if let Some(before) = before {
+            crossed.extend(before.crossed);
+            crossed.extend(around(&net.mesh, before.end, arc.start)?);
+        }
+        let turns: i32 = crossed.iter().map(|&h| jump_across(&net.mesh, &net.jump, h)).sum();
+        Some(Chain { heading: (i32::from(arc.heading) + turns).rem_euclid(4) as u8, ..whole })
+    }
+
+    /// From the node at an end of an arc across the arc to a held node: none if it is held itself.
+    fn sideways(&self, net: &Net, end: ArcEnd) -> Option<Vec<ArcEnd>> {
+        let node = |(a, e): ArcEnd| net.arcs[a as usize].nodes[usize::from(e)] as usize;
+        if self.held[node(end)] {
+            return Some(Vec::new());
+        }
+        let mut at = end;
+        for _ in 0..3 {
+            at = self.next[at.0 as usize][usize::from(at.1)]?;
+            let (list, closed) = self.walk(at);
+            let tail = list.last()?;
+            let across = Some(at) != self.opposite[end.0 as usize][usize::from(end.1)];
+            if across && !closed && self.held[node((tail.0, !tail.1))] {
+                return Some(list);
+            }
+        }
+        None
+    }
+
+    /// The corner of the end of an arc.
+    pub(super) fn corner(&self, net: &Net, (a, second): ArcEnd) -> HalfedgeId {
+        let arc = &net.arcs[a as usize];
+        if second { arc.end } else { arc.start }
     }
 
     /// Holds all nodes to their arcs.
@@ -132,14 +189,17 @@ fn directed(net: &Net, (a, second): ArcEnd) -> Chain {
 
 /// The arcs given by the ends they are entered through, as one chain.
 fn join(net: &Net, list: &[ArcEnd]) -> Option<Chain> {
-    let mut parts = list.iter().map(|&e| directed(net, e));
-    let mut whole = parts.next()?;
-    for part in parts {
-        whole.crossed.extend(around(&net.mesh, whole.end, part.start)?);
-        whole.crossed.extend(part.crossed);
-        whole.end = part.end;
-    }
-    Some(whole)
+    let (&first, rest) = list.split_first()?;
+    rest.iter().try_fold(directed(net, first), |chain, &at| extend(net, chain, at))
+}
+
+/// A chain and the arc that goes on from it.
+fn extend(net: &Net, mut chain: Chain, at: ArcEnd) -> Option<Chain> {
+    let part = directed(net, at);
+    chain.crossed.extend(around(&net.mesh, chain.end, part.start)?);
+    chain.crossed.extend(part.crossed);
+    chain.end = part.end;
+    Some(chain)
 }
 
 /// The half-edges crossed from the triangle of one corner to that of another at the same vertex, which is regular, so

@@ -215,7 +215,7 @@ fn an_optimisation_is_watched_stopped_and_kept() {
     // The scene is still that of before; the picture runs ahead.
     assert_eq!(window.state().scene().unwrap().layout.as_ref().unwrap().nodes[0].position.x, stand_in::moved(0));
     assert!(window.query_by_label("Optimise").is_none());
-    window.get_by_label_contains("3 folded triangles");
+    window.get_by_label_contains("· 3 folds");
     until(&mut window, |app| first_node(app) > stand_in::moved(5));
     window.get_by_label("Stop").click();
     wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
@@ -287,7 +287,7 @@ fn the_surface_takes_the_colours_that_are_chosen() {
     let plain = window.render().unwrap();
     window.get_by_role(egui::accesskit::Role::ComboBox).click();
     window.run_steps(4);
-    window.get_by_label("Alignment").click();
+    window.get_by_label("Alignment error").click();
     window.run_steps(6);
     assert_eq!(window.state().colours(), Colours::Alignment);
     window.get_by_label_contains("Degrees off the nearest");

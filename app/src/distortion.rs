@@ -38,7 +38,7 @@ impl Colours {
         match self {
             Self::Regions => "Regions",
             Self::Conformal => "Conformal distortion",
-            Self::Alignment => "Alignment",
+            Self::Alignment => "Alignment error",
         }
     }
 

@@ -318,8 +318,10 @@ impl LayoutPreview {
 /// An arc of the layout.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LayoutArc {
-    /// From node to node; empty while it cannot be drawn.
+    /// From node to node.
     pub points: Vec<DVec3>,
+    /// Whether it only shows about where it will be, while the map has folds in its way.
+    pub sketched: bool,
     /// Whether it is to stay where it is.
     pub pinned: bool,
 }

@@ -15,6 +15,8 @@ pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
 pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
 /// Arcs of the layout.
 pub const ARC: [u8; 4] = [0x24, 0x26, 0x2a, 0xff];
+/// Arcs that are only shown about where they will be.
+const SKETCHED: [u8; 4] = [0x24, 0x26, 0x2a, 0x78];
 /// Inside of a pinned arc.
 const CORE: [u8; 4] = [0xff, 0xff, 0xff, 0xff];
 /// Regular nodes of the layout.
@@ -172,7 +174,8 @@ fn draw_layout(layout: &LayoutPreview, part: Option<LayoutPart>, lines: &mut Vec
         lines.push(line(&arc.points, PROPOSED, 8.0, 0.0));
     }
     for arc in layout.arcs.iter().filter(|a| a.points.len() > 1) {
-        lines.push(line(&arc.points, ARC, if arc.pinned { 5.4 } else { 2.2 }, 0.10));
+        let color = if arc.sketched { SKETCHED } else { ARC };
+        lines.push(line(&arc.points, color, if arc.pinned { 5.4 } else { 2.2 }, 0.10));
         if arc.pinned {
             lines.push(line(&arc.points, CORE, 2.0, 0.0));
         }

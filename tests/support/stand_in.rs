@@ -43,12 +43,13 @@ impl Opener for StandIn {
             ..DisplaySurface::default()
         };
         let index = SurfaceIndex::new(&mesh);
-        let on_surface = |x: f64, y: f64| index.nearest(DVec3::new(x, y, 1.0)).position(&mesh);
+        let height = |x, y| index.nearest(DVec3::new(x, y, 1.0)).position(&mesh).z;
+        let on_surface = |x: f64, y: f64| DVec3::new(x, y, height(x, y));
         let node = |at: DVec3| LayoutNode { position: at, valence: 3, irregular: true, pinned: false };
         let along = (0..=20).map(|i| on_surface(-0.1 + 0.01 * f64::from(i), 0.0)).collect();
         let layout = LayoutPreview {
             nodes: vec![node(on_surface(-0.1, 0.0)), node(on_surface(0.1, 0.0))],
-            arcs: vec![LayoutArc { points: along, pinned: false }],
+            arcs: vec![LayoutArc { points: along, ..LayoutArc::default() }],
         };
         let (index, mesh, surface) = (Arc::new(index), Arc::new(mesh), Arc::new(surface));
         Ok(Box::new(Session { mesh, index, surface, strips: 0, layout, embedding: None }))

@@ -8,7 +8,9 @@ use plait_core::embed::{
     Embedded, EmbeddingError, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature, measure_patches,
 };
 use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
+use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
+use plait_core::surface::SurfaceIndex;
 use plait_core::weave::{self, Drawn, Pin, PinnedParts, Session, WeaveError};
 
 use crate::engine::{
@@ -50,7 +52,7 @@ fn preview(layout: &QuadLayout, nodes: &[DVec3], arcs: impl Iterator<Item = Vec<
         pinned: false,
     };
     LayoutPreview {
-        arcs: arcs.map(|points| LayoutArc { points, pinned: false }).collect(),
+        arcs: arcs.map(|points| LayoutArc { points, ..LayoutArc::default() }).collect(),
         nodes: layout.nodes.iter().zip(nodes).map(node).collect(),
     }
 }
@@ -87,7 +89,10 @@ pub fn optimise(
     let start = last.map_or(&shown.preview, |l| &l.preview);
     let layout = with_pins(start, &pinned);
     let mut from = |drawn: &Drawn| {
-        let mut steps = Steps { layout: layout.clone(), energy: None };
+        let model = session.model();
+        let ends = drawn.layout.arcs.iter().map(|a| a.nodes).collect();
+        let layout = layout.clone();
+        let mut steps = Steps { index: &model.index, mesh: &model.mesh, ends, layout, energy: None };
         let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
             ControlFlow::Continue(()) => Next::Continue,
             ControlFlow::Break(()) => Next::Finish,
@@ -112,26 +117,52 @@ fn failed(error: &EmbeddingError, progress: &Progress) -> EngineError {
     if progress.is_cancelled() { EngineError::Cancelled } else { EngineError::failed(error.to_string()) }
 }
 
-/// What was shown last, for arcs that cannot be followed for the moment.
-struct Steps {
+/// The layout as it was shown last.
+struct Steps<'a> {
+    index: &'a SurfaceIndex,
+    mesh: &'a TriMesh,
+    /// The nodes at the ends of each arc.
+    ends: Vec<[u32; 2]>,
     layout: LayoutPreview,
     /// At the start.
     energy: Option<f64>,
 }
 
-impl Steps {
+impl Steps<'_> {
     fn next(&mut self, snapshot: &Snapshot) -> EmbeddingStep {
         for (node, &position) in self.layout.nodes.iter_mut().zip(&snapshot.nodes) {
             node.position = position;
         }
-        for (arc, points) in self.layout.arcs.iter_mut().zip(&snapshot.arcs) {
-            if let Some(points) = points {
-                arc.points.clone_from(points);
+        for (i, arc) in self.layout.arcs.iter_mut().enumerate() {
+            match snapshot.arcs.get(i).and_then(Option::as_ref) {
+                Some(points) => arc.points.clone_from(points),
+                None => {
+                    let ends = self.ends[i].map(|n| snapshot.nodes[n as usize]);
+                    drag(&mut arc.points, ends, |p| self.index.nearest(p).position(self.mesh));
+                }
             }
+            arc.sketched = snapshot.arcs.get(i).is_none_or(Option::is_none);
         }
         let first = *self.energy.get_or_insert(snapshot.energy);
         let energy = if first > 0.0 { snapshot.energy / first } else { 1.0 };
         EmbeddingStep { step: snapshot.step, energy, flipped: snapshot.flipped, layout: self.layout.clone() }
+    }
+}
+
+/// Moves a line with its ends, in between by as much as its length is divided, and puts it back on the surface.
+fn drag(points: &mut [DVec3], ends: [DVec3; 2], on_surface: impl Fn(DVec3) -> DVec3) {
+    let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return };
+    let moves = [ends[0] - first, ends[1] - last];
+    if moves == [DVec3::ZERO; 2] {
+        return;
+    }
+    let length: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let (mut along, mut before, n) = (0.0, first, points.len());
+    for (k, p) in points.iter_mut().enumerate() {
+        along += p.distance(before);
+        before = *p;
+        let moved = *p + moves[0].lerp(moves[1], if length > 0.0 { along / length } else { 0.0 });
+        *p = if k == 0 || k == n - 1 { moved } else { on_surface(moved) };
     }
 }
 
@@ -222,7 +253,6 @@ fn on_surface(n_faces: usize, maps: &[PatchMap], triangles: &[Vec<TriangleMeasur
 mod tests {
     use super::*;
     use glam::DVec2;
-    use plait_core::mesh::TriMesh;
 
     #[test]
     fn triangles_of_the_surface_take_the_mean_of_their_parts() {
@@ -247,6 +277,14 @@ mod tests {
         let on = on_surface(2, &[map], &[vec![part(1.0, 2.0, false), part(3.0, 4.0, true)]]);
         assert_eq!(on[1], TriangleDistortion { conformal: 3.5, deviation: 10.0, anisotropy: 1.0, flipped: true });
         assert_eq!((on[0].conformal, on[0].flipped), (2.0, false));
+    }
+
+    #[test]
+    fn a_sketched_arc_keeps_its_ends_at_the_nodes() {
+        let mut line: Vec<DVec3> = (0..5).map(|i| DVec3::new(f64::from(i), 0.0, 0.0)).collect();
+        drag(&mut line, [DVec3::Y, DVec3::new(4.0, 0.0, 0.0)], |p| p.with_z(7.0));
+        assert_eq!((line[0], line[2]), (DVec3::Y, DVec3::new(2.0, 0.5, 7.0)));
+        assert_eq!(line[4], DVec3::new(4.0, 0.0, 0.0));
     }
 
     #[test]

@@ -39,8 +39,8 @@ fn in_progress(app: &PlaitApp, running: &Running, ui: &mut Ui, actions: &mut Vec
     ui.label(if stage.is_empty() { "Optimising" } else { stage });
     ui.add(egui::ProgressBar::new(fraction as f32).desired_height(6.0).fill(theme::ACCENT));
     let text = app.step.as_ref().map_or_else(String::new, |s| {
-        let folded = if s.flipped == 1 { "triangle" } else { "triangles" };
-        format!("Step {} · energy {:.0} % · {} folded {folded}", s.step, 100.0 * s.energy, s.flipped)
+        let folds = if s.flipped == 1 { "fold" } else { "folds" };
+        format!("Step {} · energy {:.0} % · {} {folds}", s.step, 100.0 * s.energy, s.flipped)
     });
     ui.label(RichText::new(text).color(theme::QUIET));
     ui.horizontal(|ui| {
@@ -101,7 +101,7 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
             let [before, after] = s.energy.map(significant);
             row(
                 "Energy",
-                format!("{before} → {after}"),
+                format!("{before} to {after}"),
                 "What is minimised, over the surface's area, before and after",
             );
             let [before, after] = s.flipped;

@@ -39,6 +39,8 @@ const DRAWN: f64 = 0.5;
 /// Rounds of guiding the first field, in each of which more directions come to agree.
 const FIRST_ROUNDS: usize = 4;
 
+/// How close irregular nodes may come to each other on the surface, in least lengths of arcs.
+const APART: f64 = 1.5;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
 const ALIKE: f64 = 0.3;
 /// By what a step is then lengthened, and how far at most.
@@ -141,7 +143,7 @@ impl<'a> Optimizer<'a> {
             ends[arc.nodes[0] as usize].push((a, false));
             ends[arc.nodes[1] as usize].push((a, true));
         }
-        let ground = ground(&surface, &net, &sharp, pinned);
+        let ground = ground(&surface, &net, &sharp, pinned, settings);
         let nearest = |v: usize| {
             if v < surface.mesh.n_vertices() {
                 return surface.curvature[v];
@@ -151,8 +153,7 @@ impl<'a> Optimizer<'a> {
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
         let spacing = Spacing::none(layout.chords);
-        let mean_edge = net.mesh.edges().map(|e| net.mesh.edge_length(e)).sum::<f64>() / net.mesh.n_edges() as f64;
-        let least = settings.spacing * mean_edge;
+        let least = settings.spacing * mean_edge(&net.mesh);
         let guided = GuidedSystem::new(&net.mesh)?;
         let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
@@ -528,7 +529,13 @@ fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<bool> {
         .collect()
 }
 
-fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: impl Fn(usize) -> bool) -> Ground<'a> {
+fn ground<'a>(
+    surface: &Surface<'a>,
+    net: &Net,
+    sharp: &[bool],
+    pinned: impl Fn(usize) -> bool,
+    settings: Settings,
+) -> Ground<'a> {
     let mesh = &net.mesh;
     let curve: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] || mesh.is_boundary_edge(e)).collect();
     let mut degree = vec![0; mesh.n_vertices()];
@@ -549,7 +556,19 @@ fn ground<'a>(surface: &Surface<'a>, net: &Net, sharp: &[bool], pinned: impl Fn(
         })
         .collect();
     let on_curve = degree.iter().map(|&d| d > 0).collect();
-    Ground { surface: surface.mesh, index: surface.index, home: mesh.positions().to_vec(), curve, on_curve, hold }
+    Ground {
+        surface: surface.mesh,
+        index: surface.index,
+        home: mesh.positions().to_vec(),
+        curve,
+        on_curve,
+        hold,
+        apart: APART * settings.spacing * mean_edge(mesh),
+    }
+}
+
+fn mean_edge(mesh: &TriMesh) -> f64 {
+    mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64
 }
 
 /// Cosine below which a curve has a corner: half way to a right angle.

@@ -31,6 +31,11 @@ pub struct NetNode {
 }
 
 impl NetNode {
+    /// Whether the field is regular there.
+    pub fn is_regular(&self) -> bool {
+        self.index() == 0
+    }
+
     /// Index of the field there, in quarters; at the boundary against the boundary's direction.
     pub fn index(&self) -> i32 {
         (if self.boundary { 2 } else { 4 }) - self.valence as i32

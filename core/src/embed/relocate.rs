@@ -46,6 +46,8 @@ pub(super) struct Ground<'a> {
     pub on_curve: Vec<bool>,
     /// What holds each node.
     pub hold: Vec<Hold>,
+    /// How close irregular nodes may come to each other.
+    pub apart: f64,
 }
 
 impl Ground<'_> {
@@ -56,8 +58,8 @@ impl Ground<'_> {
         for _ in 0..=HALVINGS {
             let trace = straightest(&net.mesh, metric, v, step.to_angle().rem_euclid(std::f64::consts::TAU), length);
             let own = net.mesh.face_vertices(trace.end.face).iter().any(|w| cell[w.index()] == node as u32);
-            if !trace.stopped && own {
-                let place = self.index.nearest(trace.end.position(&net.mesh)).position(self.surface);
+            let place = self.index.nearest(trace.end.position(&net.mesh)).position(self.surface);
+            if !trace.stopped && own && self.keeps_apart(net, node, place) {
                 let strip = strip(&net.mesh, trace.first, &trace.crossed);
                 if self.settle(net, node, place, trace.end.face, &strip) {
                     return length;
@@ -66,6 +68,18 @@ impl Ground<'_> {
             length *= 0.5;
         }
         0.0
+    }
+
+    /// Whether a node at `place` is far enough from the others, or at least no closer than it was. Irregular nodes that
+    /// come close together circle each other and wind up their arcs.
+    fn keeps_apart(&self, net: &Net, node: usize, place: DVec3) -> bool {
+        let old = net.mesh.position(net.nodes[node].vertex);
+        net.nodes[node].is_regular()
+            || net.nodes.iter().enumerate().filter(|&(i, n)| i != node && !n.is_regular()).all(|(_, n)| {
+                let other = net.mesh.position(n.vertex);
+                let (before, after) = (other.distance(old), other.distance(place));
+                after > before || after > self.apart
+            })
     }
 
     /// Puts the node at `place` in `face`, by one of its corners; nothing changes if none will do.

@@ -87,7 +87,9 @@ impl Ground<'_> {
         let from = net.nodes[node].vertex;
         let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
         let mut corners: Vec<VertexId> = net.mesh.face_vertices(face).to_vec();
-        corners.retain(|&v| v == from || (!taken.contains(&v) && !self.on_curve[v.index()]));
+        // A triangle with nodes at two corners has little choice in the map, one with three none at all.
+        let beside = |v: VertexId| net.mesh.outgoing(v).any(|h| taken.contains(&net.mesh.target(h)));
+        corners.retain(|&v| v == from || !(taken.contains(&v) || self.on_curve[v.index()] || beside(v)));
         corners.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
         for to in corners {
             let Some(path) = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v)) else { continue };

@@ -35,9 +35,11 @@ impl Shape {
         if ratio.is_nan() { f64::INFINITY } else { ratio }
     }
 
-    /// Whether the image is turned over or has become flat.
+    /// Whether the image is turned over, has become flat, or faces away from the direction wanted. The last happens where
+    /// a map makes a node of eight quarters out of four: no triangle need be turned over for it, but all isolines go
+    /// astray.
     pub fn is_folded(&self) -> bool {
-        self.ratio() >= FOLDED
+        self.ratio() >= FOLDED || self.similarity.x <= 0.0
     }
 }
 

@@ -40,6 +40,13 @@ const DRAWN: f64 = 0.5;
 /// Rounds of guiding the first field, in each of which more directions come to agree.
 const FIRST_ROUNDS: usize = 4;
 
+/// Rounds of stiffening; by what a folded triangle's weight grows in each, and up to what; over how many rings of
+/// triangles that fades out, and by what factor in each.
+const STIFFENINGS: usize = 15;
+const STIFFER: f64 = 1.5;
+const STIFFEST: f64 = 1e4;
+const FADING: usize = 5;
+const FADE: f64 = 0.7;
 /// How close irregular nodes may come to each other on the surface, in least lengths of arcs.
 const APART: f64 = 1.5;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
@@ -342,8 +349,10 @@ impl<'a> Optimizer<'a> {
                 break;
             }
         }
+        self.stiffen(progress)?;
         let State { net, metric, field, objective, solution } = &mut self.state;
         let Some(system) = &self.seamless else { return Ok((self.state, Vec::new())) };
+        objective.stiffness.clear();
         let mut quarters = vec![4; net.mesh.n_vertices()];
         for v in net.mesh.vertices().filter(|&v| net.mesh.is_boundary_vertex(v)) {
             quarters[v.index()] = 0;
@@ -357,6 +366,31 @@ impl<'a> Optimizer<'a> {
         solution.energy = unfolded.energy;
         solution.free = unfolded.y;
         Ok((self.state, unfolded.folds))
+    }
+
+    /// Makes triangles at folds count more, and again, until none is left or it helps no more (Bommes, Zimmer and Kobbelt,
+    /// Mixed-Integer Quadrangulation, section 5.4): what that leaves is few and local.
+    fn stiffen(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        let Some(mut system) = self.seamless.take() else { return Ok(()) };
+        let mut weight = vec![1.0; self.state.net.mesh.n_faces()];
+        let mut work = self.state.clone();
+        let mut least = work.flipped();
+        for _ in 0..STIFFENINGS {
+            if least == 0 {
+                break;
+            }
+            raise(&work.net.mesh, &work.folded(), &mut weight);
+            work.objective.stiffness = weight.clone();
+            work.solution = system.solve(&work.metric, &work.field, &work.objective, progress)?;
+            let now = work.flipped();
+            tracing::debug!(folds = now, "stiffened");
+            if now < least {
+                least = now;
+                self.state = work.clone();
+            }
+        }
+        self.seamless = Some(system);
+        Ok(())
     }
 
     /// Field and map of a net, with the field at hand as the one before.
@@ -605,6 +639,22 @@ fn ground<'a>(
 
 fn mean_edge(mesh: &TriMesh) -> f64 {
     mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64
+}
+
+/// Raises the weights of folded triangles, less in the rings around them.
+fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
+    let mut share: Vec<f64> = folded.iter().map(|&f| if f { 1.0 } else { 0.0 }).collect();
+    for _ in 0..FADING {
+        let wider = |f: crate::mesh::FaceId| {
+            let sides = mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h));
+            let around = sides.map(|t| share[t.index() / 3]).fold(0.0, f64::max);
+            share[f.index()].max(FADE * around)
+        };
+        share = mesh.faces().map(wider).collect();
+    }
+    for (w, s) in weight.iter_mut().zip(share) {
+        *w = (*w * (1.0 + STIFFER * s)).min(STIFFEST);
+    }
 }
 
 /// Cosine below which a curve has a corner: half way to a right angle.

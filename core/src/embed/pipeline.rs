@@ -1,6 +1,6 @@
 //! From a rough drawing to the finished embedding: nodes moved, folds removed, arcs traced, patches cut out.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::Serialize;
 
 use super::descent::{Optimizer, Settings, State, Surface};
@@ -10,7 +10,7 @@ use super::trace::{ArcChain, Folds, preview_arcs, trace_arcs};
 use super::{EmbeddingError, map_rectangles};
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::VertexId;
-use crate::param::FoldReason;
+use crate::param::{FoldReason, Residual, residuals};
 use crate::progress::Progress;
 
 /// A layout to be embedded.
@@ -95,10 +95,25 @@ pub struct Embedded {
     pub report: EmbeddingReport,
 }
 
+/// Share of the wanted area below which an image is as good as flat.
+const FLAT: f64 = 1e-3;
+
 impl State {
-    /// Number of triangles that the map turns over.
+    /// Number of triangles that the map turns over, or by more than a right angle away from the field.
     pub fn flipped(&self) -> usize {
-        self.net.mesh.faces().filter(|&f| self.solution.map.is_flipped(f)).count()
+        self.folded().iter().filter(|&&f| f).count()
+    }
+
+    /// For each triangle whether the map turns it over, or by more than a right angle away from the field.
+    pub(super) fn folded(&self) -> Vec<bool> {
+        let errors = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
+        let lengths = |f: usize| self.objective.lengths.get(f).copied().unwrap_or([1.0; 2]);
+        let folded = |(f, r): (usize, &Residual)| {
+            let [a, b] = lengths(f);
+            let (u, v) = (r.u + DVec2::new(a, 0.0), r.v + DVec2::new(0.0, b));
+            u.perp_dot(v) <= FLAT * a * b || u.x / a + v.y / b <= 0.0
+        };
+        errors.iter().enumerate().map(folded).collect()
     }
 
     fn chains(&self) -> Vec<ArcChain<'_>> {

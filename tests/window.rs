@@ -220,7 +220,7 @@ fn an_optimisation_is_watched_stopped_and_kept() {
     window.get_by_label("Stop").click();
     wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
     assert!(first_node(window.state()) > stand_in::moved(5));
-    window.get_by_label("0.500 to 0.250");
+    window.get_by_label("0.50 to 0.25");
     window.get_by_label("3 to 0");
     window.get_by_label("7.5° off");
     window.get_by_label("Optimise again");

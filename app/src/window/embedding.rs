@@ -105,7 +105,7 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
                 "What is minimised, over the surface's area, before and after",
             );
             let [before, after] = s.flipped;
-            row("Folded triangles", format!("{before} to {after}"), "Triangles the map turns over, before and after");
+            row("Folds", format!("{before} to {after}"), "Triangles the map turns over, before and after");
             row(
                 "Conformal",
                 format!("{:.3}", s.conformal),
@@ -113,9 +113,10 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
             );
             row("Alignment", format!("{:.1}° off", s.alignment), "E°: mean angle to the nearest principal direction");
             row("Planarity", significant(s.planar), "E_planar: 0 where quads along the isolines are flat");
-            ui.label(RichText::new("Worst aspect").color(theme::QUIET)).on_hover_text("Of the most oblong patch");
+            ui.label(RichText::new("Aspect").color(theme::QUIET))
+                .on_hover_text("Of the most oblong patch: longer to shorter side");
             let (aspect, place) = s.aspect;
-            let text = RichText::new(format!("1 : {aspect:.1}")).color(theme::ACCENT);
+            let text = RichText::new(format!("{aspect:.1} to 1 at worst")).color(theme::ACCENT);
             let link = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
             if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
                 actions.push(Action::LookAt(place));
@@ -201,8 +202,8 @@ fn scale(colours: Colours, ui: &mut Ui) {
     }
 }
 
-/// Three significant digits.
+/// Two significant digits.
 fn significant(value: f64) -> String {
-    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    let digits = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.digits$}")
 }

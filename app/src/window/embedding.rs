@@ -89,10 +89,10 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
         .fill(theme::RAISED)
         .stroke(Stroke::new(1.0, theme::LINE))
         .corner_radius(8.0)
-        .inner_margin(Margin::symmetric(12, 8));
+        .inner_margin(Margin::symmetric(10, 8));
     card.show(ui, |ui| {
         ui.set_width(ui.available_width());
-        egui::Grid::new("embedding").num_columns(2).spacing([14.0, 1.0]).show(ui, |ui| {
+        egui::Grid::new("embedding").num_columns(2).spacing([10.0, 1.0]).show(ui, |ui| {
             let mut row = |name: &str, value: String, hover: &str| {
                 ui.label(RichText::new(name).color(theme::QUIET)).on_hover_text(hover);
                 ui.label(value).on_hover_text(hover);
@@ -202,8 +202,8 @@ fn scale(colours: Colours, ui: &mut Ui) {
     }
 }
 
-/// Two significant digits.
+/// Three significant digits.
 fn significant(value: f64) -> String {
-    let digits = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.digits$}")
 }

@@ -300,3 +300,23 @@ fn the_surface_takes_the_colours_that_are_chosen() {
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
     assert_eq!(window.state().colours(), Colours::Regions);
 }
+
+#[test]
+fn the_layout_of_a_cube_is_optimised_in_earnest() {
+    let mut window = open("rounded-cube");
+    for round in 1..=3 {
+        window.key_press(egui::Key::S);
+        wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == round));
+    }
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.layout.is_some()));
+    let drawn = window.state().layout().unwrap().clone();
+    window.get_by_label("Optimise").click();
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
+    let scene = window.state().scene().unwrap();
+    let (summary, layout) = (scene.embedding.as_ref().unwrap(), window.state().layout().unwrap());
+    assert!(summary.energy[1] < summary.energy[0] && summary.flipped[1] == 0, "{:?}", summary.energy);
+    assert!(summary.conformal < 2.05 && summary.alignment < 5.0, "{} {}", summary.conformal, summary.alignment);
+    assert_eq!(summary.triangles.len(), scene.design_mesh.n_faces());
+    assert_eq!((layout.nodes.len(), layout.arcs.len()), (8, 12));
+    assert_ne!(layout.nodes, drawn.nodes);
+}

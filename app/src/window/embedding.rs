@@ -98,6 +98,7 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
                 ui.label(value).on_hover_text(hover);
                 ui.end_row();
             };
+            row("Steps", s.steps.to_string(), "Steps of the nodes");
             let [before, after] = s.energy.map(significant);
             row(
                 "Energy",

@@ -292,10 +292,31 @@ fn the_surface_takes_the_colours_that_are_chosen() {
     assert_eq!(window.state().colours(), Colours::Alignment);
     window.get_by_label_contains("Degrees off the nearest");
     let picture = window.render().unwrap();
-    // Half of the triangles are at the dark red end of the scale.
-    let red = |p: &image::RgbaImage| p.pixels().filter(|p| p[0] > 60 && p[1] < p[0] / 2 && p[2] < p[0] / 2).count();
+    // Half of the triangles are at the dark red end of the scale, none was before.
+    let is_red = |p: &&image::Rgba<u8>| i32::from(p[0]) > i32::from(p[1].max(p[2])) + 25;
+    let red = |p: &image::RgbaImage| p.pixels().filter(is_red).count();
     assert!(red(&picture) > red(&plain) + 5000, "{} {}", red(&picture), red(&plain));
     window.key_press(egui::Key::S);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
     assert_eq!(window.state().colours(), Colours::Regions);
+}
+
+#[test]
+fn the_layout_of_a_cube_is_optimised_in_earnest() {
+    let mut window = open("rounded-cube");
+    for round in 1..=3 {
+        window.key_press(egui::Key::S);
+        wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == round));
+    }
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.layout.is_some()));
+    let drawn = window.state().layout().unwrap().clone();
+    window.get_by_label("Optimise").click();
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
+    let scene = window.state().scene().unwrap();
+    let (summary, layout) = (scene.embedding.as_ref().unwrap(), window.state().layout().unwrap());
+    assert!(summary.energy[1] < summary.energy[0] && summary.flipped[1] == 0, "{:?}", summary.energy);
+    assert!(summary.conformal < 2.05 && summary.alignment < 5.0, "{} {}", summary.conformal, summary.alignment);
+    assert_eq!(summary.triangles.len(), scene.design_mesh.n_faces());
+    assert_eq!((layout.nodes.len(), layout.arcs.len()), (8, 12));
+    assert_ne!(layout.nodes, drawn.nodes);
 }

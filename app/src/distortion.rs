@@ -10,8 +10,8 @@ pub const FOLDED: [u8; 3] = [0xf0, 0x00, 0xd8];
 /// From best to worst, at equal distances.
 const SCALE: [[u8; 3]; 5] =
     [[0xf4, 0xf6, 0xe6], [0xf6, 0xd5, 0x8a], [0xf0, 0x99, 0x4a], [0xcb, 0x4b, 0x32], [0x6a, 0x10, 0x26]];
-/// Strength of the colours over the material.
-const STRENGTH: f64 = 224.0;
+/// Strength of the colours over the material, of 255: nearly all, or the dark end would look like the middle.
+const STRENGTH: f64 = 250.0;
 /// Stretch, as a ratio of lengths, at the end of the scale; its conformal distortion is 4.25.
 const WORST_STRETCH: f64 = 4.0;
 /// Deviation at the end of the scale, in degrees: no direction is farther from both principal ones.
@@ -37,7 +37,7 @@ impl Colours {
     pub fn label(self) -> &'static str {
         match self {
             Self::Regions => "Regions",
-            Self::Conformal => "Conformal distortion",
+            Self::Conformal => "Conformal error",
             Self::Alignment => "Alignment error",
         }
     }

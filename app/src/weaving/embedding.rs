@@ -22,6 +22,13 @@ use crate::engine::{
 /// principal directions count as fully pronounced.
 const PRONOUNCED: f64 = 0.5;
 
+/// Arcs of the first drawing bend where they cross strips; for show they are divided into so many parts,
+const FAIRED_PARTS: usize = 48;
+/// each point is drawn to its neighbours so often that kinks spread over a quarter of the arc,
+const FAIRING_ROUNDS: usize = 120;
+/// and put back on the surface whenever so many rounds have led it off.
+const ROUNDS_OFF_SURFACE: usize = 15;
+
 /// The first drawing of a layout, and how it is shown.
 pub struct Shown {
     pub drawn: Drawn,
@@ -40,8 +47,47 @@ impl Shown {
     pub fn new(session: &Session, progress: &Progress) -> Result<Self, WeaveError> {
         let drawn = weave::draw(session, progress)?;
         let (nodes, arcs) = drawing(&drawn.embedding);
-        Ok(Self { preview: preview(&drawn.layout, &nodes, arcs.into_iter()), drawn })
+        let model = session.model();
+        let on_surface = |p| model.index.nearest(p).position(&model.mesh);
+        // Along the boundary arcs already are as they will be.
+        let boundary = |i: usize| drawn.layout.arcs[i].boundary;
+        let arcs = arcs.into_iter().enumerate();
+        let arcs = arcs.map(|(i, arc)| if boundary(i) { arc } else { faired(&arc, on_surface) });
+        Ok(Self { preview: preview(&drawn.layout, &nodes, arcs), drawn })
     }
+}
+
+/// A line without the kinks of the first drawing, from the same start to the same end.
+fn faired(line: &[DVec3], on_surface: impl Fn(DVec3) -> DVec3) -> Vec<DVec3> {
+    let mut points = divided(line, FAIRED_PARTS);
+    for round in 1..=FAIRING_ROUNDS {
+        let before = points.clone();
+        for (p, around) in points[1..].iter_mut().zip(before.windows(3)) {
+            *p = 0.25 * (around[0] + 2.0 * around[1] + around[2]);
+        }
+        if round % ROUNDS_OFF_SURFACE == 0 {
+            let inner = points.len().saturating_sub(1);
+            points[1..inner].iter_mut().for_each(|p| *p = on_surface(*p));
+        }
+    }
+    points
+}
+
+/// Points at equal distances along a line, with both ends.
+fn divided(line: &[DVec3], parts: usize) -> Vec<DVec3> {
+    let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let mut points = Vec::with_capacity(parts + 1);
+    let mut passed = 0.0;
+    for w in line.windows(2) {
+        let step = w[0].distance(w[1]);
+        while points.len() < parts && length * points.len() as f64 / parts as f64 <= passed + step {
+            let t = (length * points.len() as f64 / parts as f64 - passed) / step.max(f64::MIN_POSITIVE);
+            points.push(w[0].lerp(w[1], t.clamp(0.0, 1.0)));
+        }
+        passed += step;
+    }
+    points.extend(line.last());
+    points
 }
 
 fn preview(layout: &QuadLayout, nodes: &[DVec3], arcs: impl Iterator<Item = Vec<DVec3>>) -> LayoutPreview {
@@ -277,6 +323,15 @@ mod tests {
         let on = on_surface(2, &[map], &[vec![part(1.0, 2.0, false), part(3.0, 4.0, true)]]);
         assert_eq!(on[1], TriangleDistortion { conformal: 3.5, deviation: 10.0, anisotropy: 1.0, flipped: true });
         assert_eq!((on[0].conformal, on[0].flipped), (2.0, false));
+    }
+
+    #[test]
+    fn fairing_keeps_the_ends_and_takes_away_kinks() {
+        let kinked = [DVec3::ZERO, DVec3::new(1.0, 0.4, 0.0), DVec3::new(2.0, 0.0, 0.0)];
+        let line = faired(&kinked, |p| p);
+        assert_eq!((line.len(), line[0], line[48]), (49, kinked[0], kinked[2]));
+        let turn = |l: &[DVec3]| l.windows(3).map(|w| (w[1] - w[0]).angle_between(w[2] - w[1])).fold(0.0, f64::max);
+        assert!(turn(&line) < 0.1 && turn(&kinked) > 0.7, "{}", turn(&line));
     }
 
     #[test]

@@ -89,15 +89,16 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
         .fill(theme::RAISED)
         .stroke(Stroke::new(1.0, theme::LINE))
         .corner_radius(8.0)
-        .inner_margin(Margin::symmetric(12, 8));
+        .inner_margin(Margin::symmetric(10, 8));
     card.show(ui, |ui| {
         ui.set_width(ui.available_width());
-        egui::Grid::new("embedding").num_columns(2).spacing([14.0, 1.0]).show(ui, |ui| {
+        egui::Grid::new("embedding").num_columns(2).spacing([10.0, 1.0]).show(ui, |ui| {
             let mut row = |name: &str, value: String, hover: &str| {
                 ui.label(RichText::new(name).color(theme::QUIET)).on_hover_text(hover);
                 ui.label(value).on_hover_text(hover);
                 ui.end_row();
             };
+            row("Steps", s.steps.to_string(), "Steps of the nodes");
             let [before, after] = s.energy.map(significant);
             row(
                 "Energy",
@@ -105,7 +106,7 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
                 "What is minimised, over the surface's area, before and after",
             );
             let [before, after] = s.flipped;
-            row("Folded triangles", format!("{before} to {after}"), "Triangles the map turns over, before and after");
+            row("Folds", format!("{before} to {after}"), "Triangles the map turns over, before and after");
             row(
                 "Conformal",
                 format!("{:.3}", s.conformal),
@@ -113,9 +114,10 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
             );
             row("Alignment", format!("{:.1}° off", s.alignment), "E°: mean angle to the nearest principal direction");
             row("Planarity", significant(s.planar), "E_planar: 0 where quads along the isolines are flat");
-            ui.label(RichText::new("Worst aspect").color(theme::QUIET)).on_hover_text("Of the most oblong patch");
+            ui.label(RichText::new("Aspect").color(theme::QUIET))
+                .on_hover_text("Of the most oblong patch: longer to shorter side");
             let (aspect, place) = s.aspect;
-            let text = RichText::new(format!("1 : {aspect:.1}")).color(theme::ACCENT);
+            let text = RichText::new(format!("{aspect:.1} to 1 at worst")).color(theme::ACCENT);
             let link = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
             if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
                 actions.push(Action::LookAt(place));

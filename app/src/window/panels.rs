@@ -130,11 +130,15 @@ pub fn show(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
     let bar = |vertical| Frame::new().fill(theme::BAR).inner_margin(Margin::symmetric(10, vertical));
     egui::Panel::top("menu bar").frame(bar(5)).show(ui, |ui| top_bar(app, ui, actions));
     egui::Panel::bottom("status").frame(bar(5)).show(ui, |ui| status(app, ui));
-    let side = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(16, 14));
+    // The scroll bar runs between the content and the window's edge.
+    let side = Frame::new().fill(theme::PANEL).inner_margin(Margin { left: 16, right: 4, top: 14, bottom: 14 });
+    let content = Frame::new().inner_margin(Margin { right: 12, ..Margin::ZERO });
     egui::Panel::right("design").frame(side).default_size(300.0).size_range(250.0..=460.0).show(ui, |ui| {
         match app.scene.as_deref() {
             Some(scene) => {
-                egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| side_panel(app, scene, ui, actions));
+                egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                    content.show(ui, |ui| side_panel(app, scene, ui, actions));
+                });
             }
             None => drop(ui.label(RichText::new("No model is open").color(theme::QUIET))),
         }

@@ -189,3 +189,28 @@ fn scripts_name_the_step_that_fails() {
         assert!(matches!(run(steps), Err(ScriptError::Senseless { step, .. }) if step == wrong));
     }
 }
+
+#[test]
+fn pins_find_their_parts_again_and_follow_undo() {
+    let source = MeshSource::Builtin("rounded-cube".into());
+    let progress = Progress::new();
+    let mut s = Session::open(builtin("rounded-cube").unwrap(), source, Options::default(), &progress).unwrap();
+    s.weave_to(Goal::Separated, &progress).unwrap();
+    let drawn = draw(&s, &progress).unwrap();
+    let pins = vec![drawn.node_pin(5).unwrap(), drawn.arc_pin(3).unwrap()];
+    s.set_pins(pins.clone());
+    let text = serde_json::to_string(s.design()).unwrap();
+    let read: Design = serde_json::from_str(&text).unwrap();
+    assert_eq!(read.pins, pins);
+    let parts = drawn.pinned(&read.pins);
+    let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
+    assert_eq!((set(&parts.nodes), set(&parts.arcs)), (vec![5], vec![3]));
+
+    let last = s.design().strips[2].id;
+    s.remove(last, &progress).unwrap();
+    assert!(s.design().pins.is_empty());
+    s.undo(&progress).unwrap();
+    assert_eq!(s.design().pins, pins);
+    s.redo(&progress).unwrap();
+    assert!(s.design().pins.is_empty());
+}

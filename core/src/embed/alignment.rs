@@ -16,14 +16,14 @@ use crate::param::Relation;
 /// Largest angle, in quarter turns, between a feature and the field along it: half of what would make it ambiguous.
 const SLANT: f64 = 0.25;
 
-/// All that is to be isolines, for the field of angles `angle`.
+/// All that is to be isolines, for the field of angles `angle`: what the layout demands, and features.
 pub(super) fn relations(
     net: &Net,
     roads: &Crossroads,
     metric: &Metric,
     angle: &[f64],
     sharp: &[bool],
-) -> Vec<Relation> {
+) -> (Vec<Relation>, Vec<Relation>) {
     let chain = |c: super::straight::Chain| Relation {
         from: corner(c.start),
         crossed: c.crossed,
@@ -41,8 +41,8 @@ pub(super) fn relations(
     };
     let border = net.mesh.edges().map(|e| net.mesh.halfedge(e));
     relations.extend(border.filter_map(|h| net.boundary.get(&h).map(|&(k, _)| on_edge(h, i32::from(k)))));
-    relations.extend(features(net, metric, angle, sharp).into_iter().map(|(h, heading)| on_edge(h, heading)));
-    relations
+    let features = features(net, metric, angle, sharp).into_iter().map(|(h, heading)| on_edge(h, heading)).collect();
+    (relations, features)
 }
 
 /// The coordinate that is constant along a heading.

@@ -15,12 +15,13 @@ use super::net::Net;
 use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::sizing::{SizingSystem, rest_turns};
+use super::snap::snap;
 use super::spacing::Spacing;
 use super::straight::{ArcEnd, Crossroads};
 use super::{EmbeddingError, alignment, voronoi};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::mesh::{TriMesh, VertexId};
-use crate::param::{Fold, Objective, SeamlessSystem, Solution};
+use crate::param::{Fold, Objective, ParamError, SeamlessSystem, Solution};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
@@ -134,9 +135,10 @@ impl<'a> Optimizer<'a> {
     pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
         let Job { surface, layout, settings, .. } = *job;
         let pinned = |i: usize| job.pinned_nodes.get(i).copied().unwrap_or(false);
-        let net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
+        let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);
+        snap(&mut net, &sharp, pinned);
         let roads = Crossroads::new(layout, pinned);
         let mut ends = vec![Vec::new(); layout.nodes.len()];
         for (a, arc) in (0..).zip(&layout.arcs) {
@@ -427,19 +429,47 @@ impl Solver<'_> {
             Vec::new()
         };
         let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
-        let mut relations = alignment::relations(&net, self.roads, &metric, &angle, self.sharp);
-        relations.extend(self.spacing.relations(&net, self.roads, self.least));
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
-        let system = match self.seamless.take() {
-            Some(mut system) => {
-                system.rebuild(mesh, &field, &nodes, &relations)?;
-                self.seamless.insert(system)
-            }
-            None => self.seamless.insert(SeamlessSystem::new(mesh, &field, &nodes, &relations)?),
-        };
+        let system = self.build(&net, &metric, &field, &nodes)?;
         progress.check()?;
         let solution = system.solve(&metric, &field, &objective, progress)?;
         Ok(State { net, metric, field, objective, solution })
+    }
+
+    /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
+    fn build(
+        &mut self,
+        net: &Net,
+        metric: &Metric,
+        field: &CrossField,
+        nodes: &[VertexId],
+    ) -> Result<&mut SeamlessSystem, EmbeddingError> {
+        let (demanded, features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
+        let mut wished = features;
+        wished.extend(self.spacing.relations(net, self.roads, self.least));
+        let mut system = self.seamless.take();
+        loop {
+            let mut relations = demanded.clone();
+            relations.extend(wished.iter().cloned());
+            let built = match &mut system {
+                Some(old) => old.rebuild(&net.mesh, field, nodes, &relations),
+                None => SeamlessSystem::new(&net.mesh, field, nodes, &relations).map(|new| system = Some(new)),
+            };
+            match (built, system) {
+                (Ok(()), Some(done)) => return Ok(self.seamless.insert(done)),
+                (Err(ParamError::Conflict { relation, .. }), kept) if !wished.is_empty() => {
+                    tracing::debug!(relation, demanded = demanded.len(), "a wish contradicts the layout");
+                    match relation.checked_sub(demanded.len()) {
+                        Some(wish) if wish < wished.len() => drop(wished.remove(wish)),
+                        // Named is what was eliminated last, which need not be the wish that is to blame.
+                        _ => wished.truncate(wished.len() / 2),
+                    }
+                    system = kept;
+                }
+                (Err(error), _) => return Err(error.into()),
+                (Ok(()), None) => system = None,
+            }
+        }
     }
 
     /// The angles of the guiding field; at first, without those of a field before, in several rounds.
@@ -457,8 +487,14 @@ impl Solver<'_> {
             Some(angle) => (angle.to_vec(), 1),
             None => (net.angle.clone(), FIRST_ROUNDS),
         };
-        for _ in 0..rounds {
-            let mut guides = held.clone();
+        for round in 0..rounds {
+            // At first features draw the field towards them; those that it still contradicts do not bend it.
+            let convinced = previous.is_some() || round >= FIRST_ROUNDS / 2;
+            let keep = |g: &field::Guide| match g.branch {
+                None if convinced => agreeing(g, angle[g.face.index()]),
+                _ => Some(*g),
+            };
+            let mut guides: Vec<field::Guide> = held.iter().filter_map(keep).collect();
             guides.extend(shape.iter().filter_map(|g| agreeing(g, angle[g.face.index()])));
             angle = self.guided.solve(mesh, metric, &net.jump, &guides, Some(&angle), progress)?.angle;
         }

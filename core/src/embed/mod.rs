@@ -23,6 +23,7 @@ mod relocate;
 mod rose;
 mod shift;
 mod sizing;
+mod snap;
 mod spacing;
 mod straight;
 mod trace;

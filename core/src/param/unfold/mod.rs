@@ -37,6 +37,9 @@ const RELAXED_RINGS: u32 = 6;
 const LARGE: usize = 2000;
 /// Most triangles to be solved at once where relations are to move: some seconds.
 const AT_ONCE: usize = 25_000;
+/// Up to how many folds that one domain does not resolve are worth solving for large parts of the surface: where more
+/// remain, the map as a whole does not fit its constraints.
+const FEW: usize = 60;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
 const WIDEST_CORNER: f64 = 175.0;
 
@@ -153,13 +156,14 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
     if y.iter().all(|y| y.is_finite()) {
         let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
         let mut best = attempt.relieve(y)?;
-        if best.folds > 0 {
+        if best.folds > 0 && best.folds <= FEW {
             best = attempt.relieve_bound(&best.y)?;
         }
-        if best.folds > 0 {
+        if best.folds > 0 && best.folds <= FEW {
             best = attempt.relax(&best.y)?;
         }
         if best.folds > 0
+            && best.folds <= FEW
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
         {
             let other = attempt.relieve(&stiff)?;

@@ -1,5 +1,6 @@
 //! The command line: without a command the window, with one the work is done without a display.
 
+pub mod embed;
 pub mod info;
 pub mod render;
 pub mod weave;
@@ -32,6 +33,8 @@ enum Command {
     Info(InfoArguments),
     /// Weave a layout and write it, from a script or by suggestions.
     Weave(WeaveArguments),
+    /// Optimise the embedding of a layout and write it.
+    Embed(EmbedArguments),
     /// Draw a design or a mesh into a PNG file.
     Render(RenderArguments),
 }
@@ -60,12 +63,54 @@ pub struct WeaveArguments {
     /// The folder to write into; made if it does not exist.
     #[arg(long)]
     pub out: PathBuf,
+    /// How fine the quads are.
+    #[command(flatten)]
+    pub size: SizeArguments,
+    /// Write the layout as it is first drawn, without optimising its embedding.
+    #[arg(long)]
+    pub no_optimise: bool,
+}
+
+/// How fine quads.obj is to be.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct SizeArguments {
     /// Edge length of the quads of quads.obj, in the mesh's units.
     #[arg(long, conflicts_with = "quads")]
     pub edge_length: Option<f64>,
     /// About how many quads quads.obj has.
     #[arg(long)]
     pub quads: Option<usize>,
+}
+
+/// Arguments of `plait embed`.
+#[derive(Debug, clap::Args)]
+pub struct EmbedArguments {
+    /// A design (.plait), a weave script (.json) or a layout file (.layout).
+    pub input: PathBuf,
+    /// The folder to write into; made if it does not exist.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// How fine the quads are.
+    #[command(flatten)]
+    pub size: SizeArguments,
+    /// Most steps of the nodes.
+    #[arg(long)]
+    pub steps: Option<usize>,
+    /// Keep lengths even over the surface.
+    #[arg(long)]
+    pub no_sizing: bool,
+    /// By how much an error of direction counts more than one of length, from 1.
+    #[arg(long)]
+    pub anisotropy: Option<f64>,
+    /// Nodes that stay where they are drawn, by their numbers in layout.layout: 0,7,12.
+    #[arg(long, value_delimiter = ',')]
+    pub pin_nodes: Vec<usize>,
+    /// Arcs that stay where they are drawn.
+    #[arg(long, value_delimiter = ',')]
+    pub pin_arcs: Vec<usize>,
+    /// Say nothing of the single steps.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// Which regions must be gone.
@@ -111,6 +156,11 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
+/// Whether a path ends in `.extension`.
+pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
 /// What a path names: a file, or a built-in model where there is no such file.
 pub fn source(path: &Path, opener: &dyn Opener) -> Source {
     let name = path.to_string_lossy();
@@ -135,6 +185,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, opener: Arc<dyn Opener
         None => window(arguments.file.as_deref(), opener),
         Some(Command::Info(info)) => info::run(info),
         Some(Command::Weave(weave)) => weave::run(weave),
+        Some(Command::Embed(embed)) => embed::run(embed),
         Some(Command::Render(render)) => render::run(render, &*opener),
     };
     match result {
@@ -147,7 +198,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, opener: Arc<dyn Opener
 }
 
 fn window(file: Option<&Path>, opener: Arc<dyn Opener>) -> anyhow::Result<()> {
-    const HEADLESS: &str = "without a display use `plait info`, `plait weave` or `plait render` (see `plait --help`)";
+    const HEADLESS: &str =
+        "without a display use `plait info`, `plait weave`, `plait embed` or `plait render` (see `plait --help`)";
     if !has_display() {
         anyhow::bail!("there is no display for the window; {HEADLESS}");
     }
@@ -181,13 +233,17 @@ mod tests {
         assert!(matches!(parse("plait info bunny.obj --json").unwrap().command, Some(Command::Info(i)) if i.json));
         let weave = parse("plait weave cube --suggest --until orange --out x --quads 500").unwrap();
         let Some(Command::Weave(weave)) = weave.command else { panic!("not weave") };
-        assert_eq!((weave.until, weave.quads), (Until::Orange, Some(500)));
+        assert_eq!((weave.until, weave.size.quads), (Until::Orange, Some(500)));
+        let embed = parse("plait embed a.layout --out x --pin-nodes 1,2 --edge-length 0.1 --steps 3").unwrap();
+        let Some(Command::Embed(embed)) = embed.command else { panic!("not embed") };
+        assert_eq!((embed.pin_nodes, embed.size.edge_length, embed.steps), (vec![1, 2], Some(0.1), Some(3)));
     }
 
     #[test]
     fn contradictions_are_refused() {
         assert!(parse("plait weave a --out x --edge-length 1 --quads 5").is_err());
         assert!(parse("plait weave a --out x --until orange").is_err());
+        assert!(parse("plait embed a --out x --pin-nodes 1,b").is_err());
         assert!(parse("plait render a --out x.png --size 10x10").is_err());
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
     }

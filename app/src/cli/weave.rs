@@ -6,12 +6,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context as _;
+use plait_core::embed::{Next, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
     Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, WeaveError, replay, write_all,
 };
 
-use super::{Until, WeaveArguments};
+use super::embed::summary;
+use super::{SizeArguments, Until, WeaveArguments, has_extension};
 
 /// Weaves and writes into the folder.
 ///
@@ -34,35 +36,41 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     }
     let woven = start.elapsed().as_secs_f64();
     let seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
-    let size = match (arguments.edge_length, arguments.quads) {
+    let embedding = ExportOptions::default().embedding.filter(|_| !arguments.no_optimise);
+    let options = ExportOptions { size: quad_size(arguments.size)?, embedding };
+    let mut watch = |_: &Snapshot| Next::Continue;
+    let export = write_all(&session, None, &options, &arguments.out, seconds, &progress, &mut watch)?
+        .map_err(|error| explain(&session, error))?;
+    say(&format!(
+        "{}: {} strips, {}, {:.1} s",
+        session.model().loaded.name,
+        session.design().strips.len(),
+        summary(&export),
+        start.elapsed().as_secs_f64(),
+    ));
+    if let Some(Err(problem)) = export.optimised {
+        say(&format!("plait: the rough drawing was written, since the optimisation failed: {problem}"));
+    }
+    Ok(())
+}
+
+/// How fine the quads are to be.
+pub(super) fn quad_size(arguments: SizeArguments) -> anyhow::Result<QuadSize> {
+    Ok(match (arguments.edge_length, arguments.quads) {
         (Some(length), _) if length.is_finite() && length > 0.0 => QuadSize::EdgeLength(length),
         (Some(length), _) => anyhow::bail!("the edge length must be positive, not {length}"),
         (None, Some(n)) => QuadSize::Count(u32::try_from(n).context("that many quads do not fit into memory")?),
         (None, None) => ExportOptions::default().size,
-    };
-    let export = write_all(&session, None, &ExportOptions { size }, &arguments.out, seconds, &progress)?
-        .map_err(|error| explain(&session, error))?;
-    say(&format!(
-        "{}: {} strips, {} patches, {} nodes ({} irregular), {} quads, {:.1} s",
-        session.model().loaded.name,
-        session.design().strips.len(),
-        export.layout.patches.len(),
-        export.layout.nodes.len(),
-        export.layout.n_irregular(),
-        export.quads.quads.len(),
-        start.elapsed().as_secs_f64(),
-    ));
-    Ok(())
+    })
 }
 
 /// A session on a script replayed, a saved design, or (to place suggestions on) a bare mesh.
-fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::Result<Session> {
+pub(super) fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::Result<Session> {
     let folder = input.parent().unwrap_or(Path::new(""));
-    let is = |extension: &str| input.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    if is("json") {
+    if has_extension(input, "json") {
         return Ok(replay(&Script::read(input)?, folder, progress)?);
     }
-    if is("plait") {
+    if has_extension(input, "plait") {
         let design = Design::read(input)?;
         let loaded = design.mesh.load(folder)?;
         return Ok(Session::resume(loaded, design, progress)?);
@@ -80,7 +88,7 @@ fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::Result<Sess
 }
 
 /// Why there is no layout, region by region where that is the reason.
-fn explain(session: &Session, error: WeaveError) -> anyhow::Error {
+pub(super) fn explain(session: &Session, error: WeaveError) -> anyhow::Error {
     let mut text = format!("no layout was written: {error}");
     for region in session.woven().red() {
         let report = &session.woven().reports[region as usize];
@@ -91,6 +99,6 @@ fn explain(session: &Session, error: WeaveError) -> anyhow::Error {
 }
 
 /// Writes a line for the user; what the program makes goes to files.
-fn say(line: &str) {
+pub(super) fn say(line: &str) {
     drop(writeln!(std::io::stderr(), "{line}"));
 }

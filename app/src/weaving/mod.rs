@@ -271,12 +271,11 @@ impl Engine for SessionEngine {
             Refinement::Quads(count) => QuadSize::Count(u32::try_from(count).unwrap_or(u32::MAX)),
             Refinement::EdgeLength(length) => QuadSize::EdgeLength(length),
         };
-        let optimised = match (&self.later.drawn, &self.later.embedded) {
-            (Some(Some(shown)), Some(optimised)) => Some((&shown.drawn.layout, &optimised.embedded)),
-            _ => None,
-        };
-        let options = weave::ExportOptions { size };
-        let written = weave::write_all(&self.session, optimised, &options, folder, Default::default(), progress);
+        let optimised = self.later.embedded.as_ref().map(|o| &o.embedded);
+        let options = weave::ExportOptions { size, ..Default::default() };
+        let mut watch = |_: &plait_core::embed::Snapshot| plait_core::embed::Next::Continue;
+        let seconds = weave::Times::new();
+        let written = weave::write_all(&self.session, optimised, &options, folder, seconds, progress, &mut watch);
         let export = written.and_then(|result| result).map_err(|e| failed(e, Some(&self.session)))?;
         let (nodes, patches) = (&export.layout.nodes, &export.layout.patches);
         let summary = format!(
@@ -286,7 +285,7 @@ impl Engine for SessionEngine {
             export.layout.n_irregular(),
             export.quads.quads.len()
         );
-        let files = ["design.plait", "layout.obj", "quads.obj", "patches.obj", "report.json"];
+        let files = ["design.plait", "layout.layout", "layout.obj", "quads.obj", "patches.obj", "report.json"];
         Ok(ExportReport { files: files.map(|f| folder.join(f)).to_vec(), summary })
     }
 }

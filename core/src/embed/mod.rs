@@ -91,6 +91,9 @@ pub enum EmbeddingError {
     /// The arcs could not be traced in the map.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// The arcs missing from a partial layout do not emerge from the map.
+    #[error("the missing arcs do not emerge: {0}")]
+    Emerge(#[from] EmergeError),
     /// The patches are not the rectangles the layout says.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),

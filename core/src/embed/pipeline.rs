@@ -7,18 +7,22 @@ use super::descent::{Optimizer, Settings, State, Surface};
 use super::measures::{Measures, measure_patches};
 use super::net::Headings;
 use super::trace::{ArcChain, Folds, preview_arcs, trace_arcs};
-use super::{EmbeddingError, map_rectangles};
+use super::{EmbeddingError, emerge, map_rectangles};
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::VertexId;
 use crate::param::{FoldReason, Residual, residuals};
 use crate::progress::Progress;
+
+/// How far the isolines that complete a partial layout are followed, in square roots of the surface's area: many times
+/// around anything, and yet an end.
+const LONGEST: f64 = 100.0;
 
 /// A layout to be embedded.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<'a> {
     /// The surface.
     pub surface: Surface<'a>,
-    /// The layout's structure.
+    /// The layout's structure; without patches where arcs are missing.
     pub layout: &'a QuadLayout,
     /// A rough drawing of it.
     pub drawing: &'a Embedding,
@@ -87,6 +91,8 @@ pub struct EmbeddingReport {
 /// A layout with its optimised embedding.
 #[derive(Debug, Clone)]
 pub struct Embedded {
+    /// The layout; of a partial one, with the arcs and nodes that have emerged after those given.
+    pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
     /// The maps of its patches.
@@ -175,9 +181,14 @@ pub fn optimise(
     progress.report("Tracing arcs", 0.9);
     let strict = if folds.is_empty() { Folds::Refuse } else { Folds::Cross };
     let (mesh, map) = (&state.net.mesh, &state.solution.map);
-    let traced = trace_arcs(mesh, map, job.layout, &state.vertices(), &state.chains(), strict)?;
+    let (layout, traced) = if job.layout.patches.is_empty() {
+        let emerged = emerge(mesh, map, &state.vertices(), LONGEST * area.sqrt())?;
+        (emerged.layout, emerged.traced)
+    } else {
+        (job.layout.clone(), trace_arcs(mesh, map, job.layout, &state.vertices(), &state.chains(), strict)?)
+    };
     progress.report("Cutting out patches", 0.95);
-    let mut maps = map_rectangles(job.layout, &traced, progress)?;
+    let mut maps = map_rectangles(&layout, &traced, progress)?;
     let bending = super::face_curvature(job.surface.mesh, job.surface.curvature, |_| true);
     let mut embedding = traced.embedding;
     // Triangles of the working mesh lie in triangles of the surface.
@@ -205,5 +216,5 @@ pub fn optimise(
         folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),
         measures,
     };
-    Ok(Embedded { embedding, maps, report })
+    Ok(Embedded { layout, embedding, maps, report })
 }

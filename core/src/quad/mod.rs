@@ -8,4 +8,4 @@ mod shape;
 mod smooth;
 
 pub use refine::{QuadMesh, chord_counts, refine};
-pub use smooth::{quality, scaled_jacobians, smooth};
+pub use smooth::{land, quality, scaled_jacobians, smooth};

@@ -84,6 +84,13 @@ impl Rail {
         self.places.get(&v).is_some_and(|p| p.fixed)
     }
 
+    /// The point of boundary vertex `v` on the boundary, and its triangle.
+    pub(super) fn place(&self, v: u32) -> Option<(DVec3, u32)> {
+        let place = self.places.get(&v)?;
+        let (_, at, face) = self.loops[place.track as usize].nearest(DVec3::ZERO, place.s, place.s);
+        Some((at, face))
+    }
+
     /// The place within reach of boundary vertex `v` that is nearest to `wanted`: its arc length, point and
     /// triangle.
     pub(super) fn slide(&self, v: u32, wanted: DVec3) -> Option<(f64, DVec3, u32)> {

@@ -40,6 +40,17 @@ pub fn quality(mesh: &QuadMesh) -> (usize, f64) {
     (folded, all.iter().sum::<f64>() / all.len().max(1) as f64)
 }
 
+/// Puts all vertices onto `base`, to the nearest place that is reached from where each is, boundary vertices along the
+/// boundary. A refinement of a mesh whose own vertices have moved on the surface lies next to it only.
+pub fn land(mesh: &mut QuadMesh, base: &TriMesh) {
+    let ground = Ground::new(base);
+    let rail = Rail::new(mesh, base);
+    for v in 0..mesh.positions.len() {
+        let (p, f) = (mesh.positions[v], mesh.base_face[v]);
+        (mesh.positions[v], mesh.base_face[v]) = rail.place(v as u32).unwrap_or_else(|| ground.follow(p, f));
+    }
+}
+
 /// Smooths `mesh` on `base`, never to the worse: fewer folded quads first, then the mean scaled Jacobian.
 /// The structure of the mesh does not change.
 ///
@@ -146,6 +157,21 @@ mod tests {
             for w in row.windows(2) {
                 let step = w[1] - w[0];
                 assert!(step.dot(before[1] - before[0]) > 0.0 && step.cross(before[1] - before[0]).length() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn vertices_beside_the_surface_land_on_it() {
+        for (base, closed) in [(torus(48, 24), true), (square(16), false)] {
+            let size = if closed { (48, 24) } else { (16, 16) };
+            let mut mesh = grid(&base, size, closed);
+            let before = mesh.positions.clone();
+            mesh.positions.iter_mut().enumerate().for_each(|(v, p)| p.z += 1e-3 * (v % 3) as f64);
+            land(&mut mesh, &base);
+            let ground = Ground::new(&base);
+            for ((&p, &f), old) in mesh.positions.iter().zip(&mesh.base_face).zip(&before) {
+                assert!(ground.follow(p, f).0.distance(p) < 1e-12 && p.distance(*old) < 3e-3);
             }
         }
     }

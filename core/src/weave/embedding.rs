@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::design::Pin;
 use super::session::{Session, WeaveError};
 use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, Surface, headings};
-use crate::layout::{Embedding, QuadLayout, embed};
+use crate::layout::{Embedding, Part, QuadLayout, embed};
 use crate::mesh::VertexId;
 use crate::progress::Progress;
 
@@ -25,6 +25,23 @@ pub struct PinnedParts {
     pub nodes: Vec<bool>,
     /// One for each arc.
     pub arcs: Vec<bool>,
+}
+
+impl PinnedParts {
+    /// Pins these nodes and arcs too.
+    ///
+    /// # Errors
+    ///
+    /// [`WeaveError::NoPart`] if there is no such node or arc.
+    pub fn pin(&mut self, nodes: &[usize], arcs: &[usize]) -> Result<(), WeaveError> {
+        for &i in nodes {
+            *self.nodes.get_mut(i).ok_or(WeaveError::NoPart(Part::Node(i as u32)))? = true;
+        }
+        for &i in arcs {
+            *self.arcs.get_mut(i).ok_or(WeaveError::NoPart(Part::Arc(i as u32)))? = true;
+        }
+        Ok(())
+    }
 }
 
 /// The layout of a session in its first drawing.
@@ -78,6 +95,14 @@ impl Drawn {
             }
         }
         parts
+    }
+
+    /// The pins that stand for these parts; this must be the first drawing.
+    pub fn pins(&self, parts: &PinnedParts) -> Vec<Pin> {
+        let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
+        let nodes = set(&parts.nodes).into_iter().filter_map(|i| self.node_pin(i));
+        let arcs = set(&parts.arcs).into_iter().filter_map(|i| self.arc_pin(i));
+        nodes.chain(arcs).collect()
     }
 
     fn position(&self, v: u32) -> DVec3 {

@@ -1,18 +1,21 @@
-//! From a woven design to files: layout, quad mesh, patch maps, report.
+//! From a drawn layout to files: embedded, mapped patch by patch, refined to quads.
+//!
+//! What is written is the optimised embedding. Where that fails, the drawing it started from is written in its place,
+//! with patches mapped one by one, and the report says why.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
-
-use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
 
 use super::embedding::{Drawn, draw};
+use super::report::{Before, Subject, Times, write_report};
 use super::session::{Session, WeaveError};
-use crate::dual::Colour;
-use crate::embed::Embedded;
-use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
+use crate::embed::{self, Embedded, EmbeddingReport, Headings, Job, Next, Settings, Snapshot, Surface, headings};
+use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, write_obj};
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, chord_counts, quality, refine, smooth};
+use crate::quad::{QuadMesh, chord_counts, land, quality, refine, smooth};
+use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,13 +31,33 @@ pub enum QuadSize {
 pub struct ExportOptions {
     /// How fine the quads are to be.
     pub size: QuadSize,
+    /// How the embedding is optimised; `None`: the drawing is written.
+    pub embedding: Option<Settings>,
 }
 
 impl Default for ExportOptions {
     fn default() -> Self {
         // Fine enough that the quads follow the surface to well below half a percent of its size.
-        Self { size: QuadSize::Count(6000) }
+        Self { size: QuadSize::Count(6000), embedding: Some(Settings::default()) }
     }
+}
+
+/// Sees every step of an optimisation that made the embedding better, and says whether to go on.
+pub type Watch<'a> = &'a mut dyn FnMut(&Snapshot) -> Next;
+
+/// A drawn layout on a surface, as it comes from a session or from a layout file.
+#[derive(Debug, Clone, Copy)]
+pub struct Sketch<'a> {
+    /// The surface.
+    pub surface: Surface<'a>,
+    /// Its place and size in the file.
+    pub units: Normalization,
+    /// The layout, without patches where arcs are missing, and its drawing.
+    pub drawn: &'a Drawn,
+    /// The headings of the arcs' sides in the charts of the regions between them.
+    pub headings: &'a [Headings],
+    /// What is to stay where it is drawn.
+    pub pinned: &'a PinnedParts,
 }
 
 /// A finished layout.
@@ -48,6 +71,12 @@ pub struct Export {
     pub maps: Vec<PatchMap>,
     /// Its refinement.
     pub quads: QuadMesh,
+    /// What the optimisation achieved, or why it failed; `None` where none was asked for.
+    pub optimised: Option<Result<EmbeddingReport, String>>,
+    /// The drawing it started from.
+    pub before: Before,
+    /// Seconds that the parts of the work took.
+    pub seconds: Times,
 }
 
 /// The layout of a session, embedded and refined.
@@ -56,104 +85,101 @@ pub struct Export {
 ///
 /// [`crate::layout::LayoutError::RedRegions`] while there are red regions.
 pub fn export(session: &Session, options: &ExportOptions, progress: &Progress) -> Result<Export, WeaveError> {
-    let Drawn { layout, embedding } = draw(session, progress)?;
-    progress.report("Mapping patches", 0.4);
-    let maps = map_patches(&layout, &embedding, progress)?;
-    export_embedded(session, layout, embedding, maps, options, progress)
+    export_session(session, None, options, progress, &mut |_| Next::Continue)
 }
 
-/// The layout of a session as it was embedded before, refined.
+fn export_session(
+    session: &Session,
+    embedded: Option<&Embedded>,
+    options: &ExportOptions,
+    progress: &Progress,
+    watch: Watch<'_>,
+) -> Result<Export, WeaveError> {
+    let model = session.model();
+    let drawn = draw(session, progress)?;
+    let sketch = Sketch {
+        surface: Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp },
+        units: model.loaded.units,
+        headings: &headings(&drawn.layout),
+        pinned: &drawn.pinned(&session.design().pins),
+        drawn: &drawn,
+    };
+    finish(&sketch, embedded, options, progress, watch)
+}
+
+/// Embeds a drawn layout, or takes it as `embedded` before, and refines it.
 ///
 /// # Errors
 ///
-/// When cancelled.
-pub fn export_embedded(
-    session: &Session,
-    layout: QuadLayout,
-    embedding: Embedding,
-    maps: Vec<PatchMap>,
+/// When cancelled; when a layout with missing arcs cannot be optimised, since only the map completes it; or when the
+/// patches of a drawing cannot be mapped.
+pub fn finish(
+    sketch: &Sketch<'_>,
+    embedded: Option<&Embedded>,
     options: &ExportOptions,
     progress: &Progress,
+    watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
-    let model = session.model();
-    progress.report("Refining to quads", 0.7);
-    let target = match options.size {
-        QuadSize::EdgeLength(length) => length / model.loaded.units.scale,
-        QuadSize::Count(n) => edge_for_count(&maps, n),
+    let Sketch { surface, drawn, headings, pinned, .. } = *sketch;
+    let Drawn { layout, embedding: drawing } = drawn;
+    let mut seconds = Times::new();
+    let start = Instant::now();
+    let optimised = match (embedded, options.embedding) {
+        (Some(embedded), _) => Some(Ok(embedded.clone())),
+        (None, None) => None,
+        (None, Some(settings)) => {
+            let (pinned_nodes, pinned_arcs) = (&pinned.nodes[..], &pinned.arcs[..]);
+            let job = Job { surface, layout, drawing, headings, pinned_nodes, pinned_arcs, settings };
+            Some(embed::optimise(&job, progress, watch))
+        }
     };
-    let counts = chord_counts(&layout, &maps, target);
-    let mut quads = refine(&layout, &embedding, &maps, &counts);
-    smooth(&mut quads, &model.mesh, progress)?;
+    progress.check()?;
+    seconds.insert("embed".to_owned(), start.elapsed().as_secs_f64());
+    progress.report("Mapping patches", 0.95);
+    let start = Instant::now();
+    let rough = (!layout.patches.is_empty()).then(|| map_patches(layout, drawing, progress));
+    progress.check()?;
+    let before = Before::new(drawing, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
+    let (layout, embedding, maps, optimised) = match (optimised, rough) {
+        (Some(Ok(e)), _) => (e.layout, e.embedding, e.maps, Some(Ok(e.report))),
+        (Some(Err(error)), None) => return Err(error.into()),
+        (None, None) => return Err(WeaveError::Incomplete),
+        (failed, Some(maps)) => {
+            let problem = failed.and_then(Result::err).map(|error| Err(error.to_string()));
+            (layout.clone(), drawing.clone(), maps?, problem)
+        }
+    };
+    let quads = quads(sketch, (&layout, &embedding, &maps), options.size, progress)?;
+    seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
-    Ok(Export { layout, embedding, maps, quads })
+    Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
+}
+
+/// The refinement of an embedded layout, on the surface.
+fn quads(
+    sketch: &Sketch<'_>,
+    (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
+    size: QuadSize,
+    progress: &Progress,
+) -> Result<QuadMesh, WeaveError> {
+    progress.report("Refining to quads", 0.97);
+    let target = match size {
+        QuadSize::EdgeLength(length) => length / sketch.units.scale,
+        QuadSize::Count(n) => edge_for_count(maps, n),
+    };
+    let counts = chord_counts(layout, maps, target);
+    let mut quads = refine(layout, embedding, maps, &counts);
+    land(&mut quads, sketch.surface.mesh);
+    if std::env::var_os("PLAIT_NO_SMOOTH").is_none() || quality(&quads).0 > 0 {
+        smooth(&mut quads, sketch.surface.mesh, progress)?;
+    }
+    Ok(quads)
 }
 
 /// The edge length at which the patches' rectangles hold about `n` quads.
 fn edge_for_count(maps: &[PatchMap], n: u32) -> f64 {
     let area: f64 = maps.iter().map(|m| m.size.x * m.size.y).sum();
     (area / f64::from(n.max(1))).sqrt()
-}
-
-/// Counts of one colour.
-#[derive(Debug, Serialize)]
-struct Colours {
-    red: usize,
-    orange: usize,
-    yellow: usize,
-}
-
-#[derive(Debug, Serialize)]
-struct Report<'a> {
-    mesh: String,
-    faces: usize,
-    genus: usize,
-    boundary_loops: usize,
-    components: usize,
-    strips: Vec<StripReport>,
-    crossings: usize,
-    regions: &'a [crate::dual::RegionReport],
-    colours: Colours,
-    layout: Option<LayoutReport>,
-    problem: Option<String>,
-    valid: bool,
-    seconds: std::collections::BTreeMap<String, f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct StripReport {
-    id: u32,
-    closed: bool,
-    length: f64,
-    cost: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct LayoutReport {
-    nodes: usize,
-    arcs: usize,
-    patches: usize,
-    chords: usize,
-    irregular: usize,
-    valences: std::collections::BTreeMap<usize, usize>,
-    euler: i64,
-    quads: usize,
-    folded_quads: usize,
-    mean_scaled_jacobian: f64,
-    flipped_triangles: usize,
-    checks: Checks,
-}
-
-/// What was checked of a finished layout.
-#[derive(Debug, Serialize)]
-struct Checks {
-    /// Nodes, arcs and patches add up to the Euler characteristic, and sides join corners.
-    structure: bool,
-    /// Every patch is a disc with four sides on the surface.
-    patches_are_discs: bool,
-    /// No map of a patch turns a triangle over.
-    maps_are_one_to_one: bool,
-    /// No quad of the refinement is folded.
-    quads_are_unfolded: bool,
 }
 
 impl Export {
@@ -209,104 +235,47 @@ impl Export {
     }
 }
 
-/// Writes `design.plait` and `report.json`, and of a valid layout the meshes; returns whether it is valid.
+/// Writes `design.plait` and `report.json`, and of a valid layout the meshes and `layout.layout`; the inner result is
+/// the layout, or why there is none.
 ///
-/// `embedded` is the layout with its optimised embedding, where there is one; `seconds` are times to note in the report.
+/// `embedded` is the optimised embedding, where there is one already; `seconds` are times to note in the report.
 ///
 /// # Errors
 ///
 /// The file that could not be written, or cancelled.
 pub fn write_all(
     session: &Session,
-    embedded: Option<(&QuadLayout, &Embedded)>,
+    embedded: Option<&Embedded>,
     options: &ExportOptions,
     folder: &Path,
-    seconds: std::collections::BTreeMap<String, f64>,
+    seconds: Times,
     progress: &Progress,
+    watch: Watch<'_>,
 ) -> Result<Result<Export, WeaveError>, WeaveError> {
-    std::fs::create_dir_all(folder).map_err(|source| WeaveError::Write { path: folder.to_owned(), source })?;
+    make_folder(folder)?;
     session.design().write(&folder.join("design.plait"))?;
-    let result = match embedded {
-        Some((layout, e)) => {
-            export_embedded(session, layout.clone(), e.embedding.clone(), e.maps.clone(), options, progress)
-        }
-        None => export(session, options, progress),
-    };
+    let result = export_session(session, embedded, options, progress, watch);
     progress.check()?;
+    let (model, design) = (session.model(), session.design());
     if let Ok(export) = &result {
-        export.write(folder, &session.model().loaded.units)?;
+        export.write(folder, &model.loaded.units)?;
+        let drawing = &export.before.drawing;
+        let mut file = LayoutFile::from_embedding(design.mesh.clone(), &model.mesh, &export.layout, drawing)?;
+        let pinned = Drawn { layout: export.layout.clone(), embedding: drawing.clone() }.pinned(&design.pins);
+        file.nodes.iter_mut().zip(pinned.nodes).for_each(|(node, pinned)| node.fixed = pinned);
+        file.arcs.iter_mut().zip(pinned.arcs).for_each(|(arc, pinned)| arc.fixed = pinned);
+        file.write(&folder.join("layout.layout"))?;
     }
-    let report = report(session, &result, seconds);
-    let text = serde_json::to_string_pretty(&report).unwrap_or_default();
-    write_file(&folder.join("report.json"), |out| writeln!(out, "{text}"))?;
+    write_report(folder, Subject::Session(session), &result, seconds, &model.mesh)?;
     Ok(result)
 }
 
-fn report<'a>(
-    session: &'a Session,
-    result: &Result<Export, WeaveError>,
-    seconds: std::collections::BTreeMap<String, f64>,
-) -> Report<'a> {
-    let (model, woven) = (session.model(), session.woven());
-    let scale = model.loaded.units.scale;
-    let strip = |s: &super::design::Strip| StripReport {
-        id: s.id.0,
-        closed: s.curve.closed,
-        length: s.curve.length(&model.mesh) * scale,
-        cost: s.cost,
-    };
-    Report {
-        mesh: model.loaded.name.clone(),
-        faces: model.mesh.n_faces(),
-        genus: model.topology.genus,
-        boundary_loops: model.topology.boundary_loops.len(),
-        components: model.topology.components.len(),
-        strips: session.design().strips.iter().map(strip).collect(),
-        crossings: woven.arrangement.crossings.len(),
-        regions: &woven.reports,
-        colours: Colours {
-            red: woven.count(Colour::Red),
-            orange: woven.count(Colour::Orange),
-            yellow: woven.count(Colour::Yellow),
-        },
-        layout: result.as_ref().ok().map(|e| layout_report(e, model.mesh.euler_characteristic())),
-        problem: result.as_ref().err().map(ToString::to_string),
-        valid: result.is_ok(),
-        seconds,
-    }
+pub(super) fn make_folder(folder: &Path) -> Result<(), WeaveError> {
+    std::fs::create_dir_all(folder).map_err(|source| WeaveError::Write { path: folder.to_owned(), source })
 }
 
-fn layout_report(e: &Export, euler: i64) -> LayoutReport {
-    let mut valences = std::collections::BTreeMap::new();
-    for n in e.layout.nodes.iter().filter(|n| !n.is_regular()) {
-        *valences.entry(n.valence).or_insert(0) += 1;
-    }
-    let (folded_quads, mean_scaled_jacobian) = quality(&e.quads);
-    let flipped_triangles = e.maps.iter().map(|m| m.flipped).sum();
-    let checks = Checks {
-        structure: e.layout.check(euler).is_ok(),
-        patches_are_discs: e.maps.iter().all(|m| m.mesh.euler_characteristic() == 1),
-        maps_are_one_to_one: flipped_triangles == 0,
-        quads_are_unfolded: folded_quads == 0,
-    };
-    LayoutReport {
-        nodes: e.layout.nodes.len(),
-        arcs: e.layout.arcs.len(),
-        patches: e.layout.patches.len(),
-        chords: e.layout.chords,
-        irregular: e.layout.n_irregular(),
-        valences,
-        euler,
-        quads: e.quads.quads.len(),
-        folded_quads,
-        mean_scaled_jacobian,
-        flipped_triangles,
-        checks,
-    }
-}
-
-fn write_file(
-    path: &PathBuf,
+pub(super) fn write_file(
+    path: &Path,
     write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), WeaveError> {
     let open = std::fs::File::create(path).map(std::io::BufWriter::new);
@@ -314,5 +283,5 @@ fn write_file(
         write(&mut out)?;
         out.flush()
     })
-    .map_err(|source| WeaveError::Write { path: path.clone(), source })
+    .map_err(|source| WeaveError::Write { path: path.to_owned(), source })
 }

@@ -70,8 +70,7 @@ impl Model {
         let mesh = Arc::new(loaded.mesh.clone());
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&mesh);
-        let mut sharp = sharp_edges(&mesh, options.sharp_dihedral);
-        drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
+        let sharp = features(&mesh, &options);
         let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
@@ -86,6 +85,13 @@ impl Model {
         let vertex_curvatures = vertex_curvatures(&mesh);
         Ok(Self { loaded, mesh, options, topology, sharp, curvature, vertex_curvatures, graph, index, corners })
     }
+}
+
+/// Whether each edge of `mesh` is a feature.
+pub(super) fn features(mesh: &TriMesh, options: &Options) -> Vec<bool> {
+    let mut sharp = sharp_edges(mesh, options.sharp_dihedral);
+    drop_short_features(mesh, &mut sharp, SHORT_FEATURE);
+    sharp
 }
 
 /// Corners closer together than this fraction of the diagonal, and of opposite index, are noise of the field.

@@ -13,7 +13,7 @@ use crate::dual::{Arrangement, ArrangementError};
 use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
-use crate::layout::{EmbedError, LayoutError, PatchError};
+use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
 use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
@@ -51,6 +51,18 @@ pub enum WeaveError {
     /// The patches could not be mapped.
     #[error(transparent)]
     Patch(#[from] PatchError),
+    /// A layout file could not be read or written.
+    #[error(transparent)]
+    LayoutFile(#[from] LayoutFileError),
+    /// The layout of a file cannot be drawn on its mesh.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// A layout that lacks arcs is completed by the optimisation only.
+    #[error("the layout lacks arcs; they only emerge when its embedding is optimised")]
+    Incomplete,
+    /// There is no such node or arc.
+    #[error("the layout has no {0}")]
+    NoPart(Part),
     /// No strip can be suggested.
     #[error(transparent)]
     Stuck(#[from] Stuck),

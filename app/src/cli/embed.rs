@@ -23,17 +23,21 @@ pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
     let progress = &*interrupt.progress;
+    let mut first = None;
     let mut watch = |snapshot: &Snapshot| {
+        let percent = 100.0 * snapshot.energy / first.get_or_insert(snapshot.energy).max(f64::MIN_POSITIVE);
         if !arguments.quiet {
-            let Snapshot { step, energy, flipped, .. } = snapshot;
-            say(&format!("step {step}: energy {energy:.6}, {flipped} folded, {:.1} s", start.elapsed().as_secs_f64()));
+            let Snapshot { step, flipped, .. } = snapshot;
+            say(&format!(
+                "step {step}: energy {percent:.1} %, {flipped} folded, {:.1} s",
+                start.elapsed().as_secs_f64()
+            ));
         }
         interrupt.next()
     };
     let seconds = || Times::from([("open".to_owned(), start.elapsed().as_secs_f64())]);
     let (faces, export) = if has_extension(&arguments.input, "layout") {
-        let mut layout =
-            OpenedLayout::read(&arguments.input, progress).with_context(|| arguments.input.display().to_string())?;
+        let mut layout = OpenedLayout::read(&arguments.input, progress)?;
         layout.pin(&arguments.pin_nodes, &arguments.pin_arcs)?;
         let written = layout.write_all(&options, &arguments.out, seconds(), progress, &mut watch)?;
         (layout.mesh().mesh.n_faces(), written.context("no layout was written")?)

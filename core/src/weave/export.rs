@@ -149,7 +149,8 @@ pub fn finish(
             (layout.clone(), drawing.clone(), maps?, problem)
         }
     };
-    let quads = quads(sketch, (&layout, &embedding, &maps), options.size, progress)?;
+    let done = matches!(optimised, Some(Ok(_)));
+    let quads = quads(sketch, (&layout, &embedding, &maps), done, options.size, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
@@ -159,9 +160,11 @@ pub fn finish(
 fn quads(
     sketch: &Sketch<'_>,
     (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
+    optimised: bool,
     size: QuadSize,
     progress: &Progress,
 ) -> Result<QuadMesh, WeaveError> {
+    let surface = sketch.surface;
     progress.report("Refining to quads", 0.97);
     let target = match size {
         QuadSize::EdgeLength(length) => length / sketch.units.scale,
@@ -169,9 +172,12 @@ fn quads(
     };
     let counts = chord_counts(layout, maps, target);
     let mut quads = refine(layout, embedding, maps, &counts);
-    land(&mut quads, sketch.surface.mesh);
-    if std::env::var_os("PLAIT_NO_SMOOTH").is_none() || quality(&quads).0 > 0 {
-        smooth(&mut quads, sketch.surface.mesh, progress)?;
+    if optimised {
+        land(&mut quads, surface.mesh);
+    }
+    // Smoothing betters all figures of a smooth surface, but takes vertices off the features they were aligned to.
+    if !optimised || !surface.sharp.contains(&true) || quality(&quads).0 > 0 {
+        smooth(&mut quads, surface.mesh, progress)?;
     }
     Ok(quads)
 }

@@ -72,6 +72,7 @@ impl Model {
         let topology = Topology::new(&mesh);
         let mut sharp = sharp_edges(&mesh, options.sharp_dihedral);
         drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
+        progress.report("Indexing the surface", 0.05);
         let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
@@ -82,8 +83,8 @@ impl Model {
         progress.report("Preparing the search for strips", 0.5);
         let elastica = ElasticaOptions { aligned_boundary: options.aligned_boundary, ..Default::default() };
         let graph = ElasticaGraph::build(mesh.clone(), &curvature, &sharp, &elastica, progress)?;
-        progress.report("Ready", 1.0);
         let vertex_curvatures = vertex_curvatures(&mesh);
+        progress.report("Ready", 1.0);
         Ok(Self { loaded, mesh, options, topology, sharp, curvature, vertex_curvatures, graph, index, corners })
     }
 }

@@ -1,5 +1,6 @@
 //! The command line: without a command the window, with one the work is done without a display.
 
+pub mod bench;
 pub mod info;
 pub mod render;
 pub mod weave;
@@ -34,6 +35,8 @@ enum Command {
     Weave(WeaveArguments),
     /// Draw a design or a mesh into a PNG file.
     Render(RenderArguments),
+    /// Time what a designer waits for.
+    Bench(bench::BenchArguments),
 }
 
 /// Arguments of `plait info`.
@@ -136,6 +139,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, opener: Arc<dyn Opener
         Some(Command::Info(info)) => info::run(info),
         Some(Command::Weave(weave)) => weave::run(weave),
         Some(Command::Render(render)) => render::run(render, &*opener),
+        Some(Command::Bench(bench)) => bench::run(bench),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

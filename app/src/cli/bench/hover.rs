@@ -46,12 +46,15 @@ pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &
             }
         }
         searches(session, arguments, &group(count), report)?;
-        pointer(session, arguments, &group(count), report)?;
+        if !arguments.search_only {
+            pointer(session, arguments, &group(count), report)?;
+        }
     }
     Ok(())
 }
 
-/// The search alone, at random points.
+/// The search alone, at random points. Never inlined: `scripts/instructions.sh` counts what it executes.
+#[inline(never)]
 fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
     let (model, mask) = (session.model(), &session.woven().mask);
     let progress = Progress::new();
@@ -69,7 +72,8 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
         let now = Instant::now();
         let mut shown = None;
         let query = ProposalQuery::cheapest(vertex, mask);
-        let best = model.graph.proposals_with(&query, &mut work, &progress, |l| shown = Some((now.elapsed(), l.cost)))?;
+        let best =
+            model.graph.proposals_with(&query, &mut work, &progress, |l| shown = Some((now.elapsed(), l.cost)))?;
         figures.proved.push(now.elapsed());
         figures.settled.push(best.settled as f64);
         let now = Instant::now();

@@ -79,6 +79,12 @@ pub struct RunArguments {
     /// Number of threads; without, one per core.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
+    /// Of hovering, time the search alone and leave out what the window adds to it.
+    #[arg(long)]
+    search_only: bool,
+    /// Of all of it, leave out embedding.
+    #[arg(long)]
+    no_embed: bool,
     /// Leave out the yardsticks.
     #[arg(long)]
     no_reference: bool,
@@ -142,7 +148,7 @@ pub fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
         BenchCommand::Hover(run) => measure(run, Parts { hover: true, ..none }),
         BenchCommand::Strips(run) => measure(run, Parts { strips: true, ..none }),
         BenchCommand::Embed(run) => measure(run, Parts { embed: true, ..none }),
-        BenchCommand::All(run) => measure(run, Parts { open: true, hover: true, strips: true, embed: true }),
+        BenchCommand::All(run) => measure(run, Parts { open: true, hover: true, strips: true, embed: !run.no_embed }),
         BenchCommand::Table(table) => write(&table::markdown(&Report::read_all(&table.reports)?)),
         BenchCommand::Plot(plot) => {
             let picture = plot::svg(&Report::read_all(&plot.reports)?)?;
@@ -196,4 +202,73 @@ fn measured(arguments: &RunArguments, parts: Parts) -> anyhow::Result<Report> {
 fn write(text: &str) -> anyhow::Result<()> {
     std::io::stdout().write_all(text.as_bytes())?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        bench: BenchArguments,
+    }
+
+    fn parse(line: &str) -> Result<BenchCommand, clap::Error> {
+        Line::try_parse_from(line.split(' ')).map(|l| l.bench.command)
+    }
+
+    #[test]
+    fn arguments_are_checked() {
+        let Ok(BenchCommand::Hover(run)) = parse("bench hover torus --strips 2,0 --points 3") else {
+            panic!("not hover")
+        };
+        assert_eq!((run.most_strips(), run.points, run.seed), (2, 3, 1));
+        for line in [
+            "bench",
+            "bench hover",
+            "bench fly torus",
+            "bench hover torus --threads 0",
+            "bench hover torus --subdivide 9",
+            "bench hover torus --points -1",
+            "bench open torus --limit nan",
+            "bench open torus --repeats 0",
+            "bench plot a.json",
+            "bench table",
+        ] {
+            assert!(parse(line).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn every_part_gives_its_rows() {
+        let line = "bench all torus --points 2 --strips 0,1 --repeats 1 --threads 1 --no-embed";
+        let Ok(BenchCommand::All(run)) = parse(line) else { panic!("not all") };
+        let parts = Parts { open: true, hover: true, strips: true, embed: false };
+        let report = measured(&run, parts).unwrap();
+        let wanted = [
+            (open::GROUP, open::READY, 1),
+            (&hover::group(0), hover::PROVED, 2),
+            (&hover::group(1), hover::ALTERNATIVES, 2),
+            (strips::GROUP, strips::PLACED, 1),
+            (reference::GROUP, reference::DIJKSTRA, 1),
+            (reference::GROUP, reference::FACTORED, 1),
+        ];
+        for (group, what, count) in wanted {
+            let row = report.row(group, what).unwrap_or_else(|| panic!("no {what}"));
+            assert!(row.count == count && 0.0 < row.median && row.median <= row.worst, "{row:?}");
+        }
+        assert_eq!((report.mesh.triangles, report.mesh.genus), (6828, 1));
+        assert!(report.graph.states > 0 && report.graph.steps > report.graph.states && report.graph.bytes > 0);
+    }
+
+    #[test]
+    fn subdividing_makes_four_of_each_triangle() {
+        let input = Input::new("sleeve".as_ref(), 1).unwrap();
+        let loaded = input.load(&Progress::new()).unwrap();
+        assert_eq!((loaded.name.as_str(), loaded.mesh.n_faces()), ("sleeve", 4 * 4914));
+        assert!(Input::new("no-such-mesh.obj".as_ref(), 0).is_err());
+    }
 }

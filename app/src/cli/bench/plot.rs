@@ -34,31 +34,33 @@ impl Curve<'_> {
     }
 }
 
-/// A logarithmic axis over whole decades.
+/// A logarithmic axis, from and to 1, 2 or 5 times a power of ten.
 struct Axis {
-    low: i32,
-    high: i32,
+    low: f64,
+    high: f64,
     from: f64,
     to: f64,
 }
 
 impl Axis {
     fn over(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
-        let low = values.clone().fold(f64::INFINITY, f64::min).log10().floor() as i32;
-        let high = values.fold(0.0, f64::max).log10().ceil() as i32;
-        Self { low, high: high.max(low + 1), from, to }
+        let (least, most) = values.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+        let round = |v: f64| [1.0, 2.0, 5.0, 10.0].map(|k| k * 10f64.powf(v.log10().floor()));
+        let low = round(least).into_iter().rfind(|&r| r <= least).unwrap_or(least);
+        let high = round(most).into_iter().find(|&r| r >= most).unwrap_or(most);
+        Self { low, high: high.max(2.0 * low), from, to }
     }
 
     fn at(&self, value: f64) -> f64 {
-        let t = (value.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
-        self.from + t * (self.to - self.from)
+        self.from + (value / self.low).ln() / (self.high / self.low).ln() * (self.to - self.from)
     }
 
     /// Values 1 to 9 of each decade, and whether it is the first.
     fn ticks(&self) -> impl Iterator<Item = (f64, bool)> {
-        let end = 10f64.powi(self.high);
-        let all = (self.low..=self.high).flat_map(|e| (1..10).map(move |k| (10f64.powi(e) * f64::from(k), k == 1)));
-        all.filter(move |t| t.0 <= end * 1.001)
+        let [first, last] = [self.low, self.high].map(|v| v.log10().floor() as i32);
+        let range = 0.999 * self.low..1.001 * self.high;
+        let all = (first..=last).flat_map(|e| (1..10).map(move |k| (10f64.powi(e) * f64::from(k), k == 1)));
+        all.filter(move |t| range.contains(&t.0))
     }
 }
 
@@ -97,10 +99,8 @@ pub(super) fn svg(reports: &[Report]) -> anyhow::Result<String> {
 fn axes(out: &mut String, x: &Axis, y: &Axis) {
     let mut line = |x1: f64, y1: f64, x2: f64, y2: f64, whole: bool| {
         let colour = if whole { "#c4c4c4" } else { "#eeeeee" };
-        let _ = writeln!(
-            out,
-            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{colour}\"/>"
-        );
+        let _ =
+            writeln!(out, "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{colour}\"/>");
     };
     for (value, whole) in x.ticks() {
         line(x.at(value), TOP, x.at(value), BOTTOM, whole);
@@ -121,7 +121,8 @@ fn axes(out: &mut String, x: &Axis, y: &Axis) {
     let (x, y) = (18.0, 0.5 * (TOP + BOTTOM));
     let _ = writeln!(
         out,
-        "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\" fill=\"#222\" transform=\"rotate(-90 {x} {y})\">median time</text>"
+        "<text text-anchor=\"middle\" fill=\"#222\" transform=\"translate({x} {y}) rotate(-90)\">\
+         median time</text>"
     );
 }
 
@@ -199,7 +200,7 @@ mod tests {
         }
         let picture = svg(&reports).unwrap();
         assert_eq!((picture.matches("<polyline").count(), picture.matches("<circle").count()), (2, 6));
-        for text in ["a loop shown", ">1k<", ">10M<", "0.01 ms", "100 s"] {
+        for text in ["a loop shown", ">1k<", ">1M<", "0.1 ms", "10 s"] {
             assert!(picture.contains(text), "{text} is missing in {picture}");
         }
         let coordinate = |part: &str| part.split('"').next().and_then(|n| n.parse::<f64>().ok()).unwrap();

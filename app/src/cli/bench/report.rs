@@ -154,9 +154,6 @@ impl Staged {
         let result = work(&progress)?;
         self.totals.push(start.elapsed());
         for StageTime { stage, seconds, .. } in progress.stage_times() {
-            if seconds == 0.0 {
-                continue;
-            }
             match self.stages.iter_mut().find(|(name, _)| *name == stage) {
                 Some((_, values)) => values.push(seconds * 1e3),
                 None => self.stages.push((stage, vec![seconds * 1e3])),
@@ -177,7 +174,9 @@ impl Staged {
 
     /// Adds a row for each stage, and one called `total` for all together.
     pub(super) fn write(self, report: &mut Report, group: &str, total: &str) {
-        for (stage, values) in self.stages {
+        // A stage that another one follows at once has no work of its own.
+        let works = |values: &[f64]| values.iter().any(|&ms| ms > 0.01);
+        for (stage, values) in self.stages.into_iter().filter(|s| works(&s.1)) {
             report.add(group, &stage, Unit::Milliseconds, values);
         }
         report.add_times(group, total, &self.totals);

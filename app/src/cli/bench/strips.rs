@@ -50,9 +50,8 @@ pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &
     let mut placements = Placements::new(session, arguments.seed);
     let (mut placed, mut removed) = (Staged::default(), Staged::default());
     for _ in 0..arguments.most_strips() {
-        let timed = |session: &mut Session, proposal, _: &Progress| {
-            placed.time(|progress| session.place(proposal, progress))
-        };
+        let timed =
+            |session: &mut Session, proposal, _: &Progress| placed.time(|progress| session.place(proposal, progress));
         if !placements.place(session, timed)? || placed.spent() > arguments.limit() {
             break;
         }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use plait_core::progress::Progress;
-use plait_core::weave::{ExportOptions, Goal, Session, export};
+use plait_core::weave::{ExportOptions, Goal, QuadSize, Session, export};
 
 use super::RunArguments;
 use super::report::{Report, Staged};
@@ -20,9 +20,11 @@ pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &
         anyhow::bail!("there is no layout to embed: {stuck}");
     }
     report.add_times(GROUP, "woven by suggestions", &[start.elapsed()]);
+    // As few quads as there can be: refining is not what is measured.
+    let options = ExportOptions { size: QuadSize::Count(1) };
     let mut staged = Staged::default();
     for _ in 0..arguments.repeats {
-        staged.time(|progress| export(session, &ExportOptions::default(), progress))?;
+        staged.time(|progress| export(session, &options, progress))?;
         if staged.spent() > arguments.limit() {
             break;
         }

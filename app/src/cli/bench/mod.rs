@@ -190,7 +190,11 @@ fn measured(arguments: &RunArguments, parts: Parts) -> anyhow::Result<Report> {
         if parts.hover || parts.strips {
             woven = session()?;
         }
-        embed::measure(&mut woven, arguments, &mut report)?;
+        match embed::measure(&mut woven, arguments, &mut report) {
+            // Beside other figures it is no reason to lose these.
+            Err(error) if parts.hover => eprintln!("plait: nothing was embedded: {error:#}"),
+            other => other?,
+        }
     }
     if !arguments.no_reference {
         reference::measure(woven.model(), arguments, &mut report)?;

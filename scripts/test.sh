@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs all tests, with what they need: a software GPU, a virtual screen, and Python for an independent check.
+# Runs all tests, with what they need: a software GPU, a virtual screen, valgrind to count instructions, and Python for
+# an independent check.
 #
 #     scripts/test.sh [ARGUMENTS OF cargo test]
 set -euo pipefail
@@ -8,7 +9,7 @@ cd "$root"
 # shellcheck source=scripts/packages.sh
 source scripts/packages.sh
 
-packages=("${linker[@]}" "${window[@]}" xvfb xdotool imagemagick)
+packages=("${linker[@]}" "${window[@]}" xvfb xdotool imagemagick valgrind)
 # The independent check of quad meshes lies beside the repository, if at all.
 if [[ -f ../shared/check/check_quads.py ]] && ! python3 -c 'import numpy, scipy' 2>/dev/null; then
     packages+=(python3 python3-numpy python3-scipy)
@@ -21,3 +22,5 @@ if cargo deny --version >/dev/null 2>&1; then
 fi
 # No example needs documentation tests: the public items are shown in use by the tests.
 cargo test --workspace --lib --bins --tests "$@"
+# Only where everything is tested: it takes half a minute.
+(($#)) || scripts/instructions.sh

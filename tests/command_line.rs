@@ -40,3 +40,24 @@ fn what_cannot_be_opened_is_named() {
     assert_eq!(output.status.code(), Some(1));
     assert!(errors(&output).contains("no-such-mesh.obj"), "{}", errors(&output));
 }
+
+#[test]
+fn a_benchmark_is_written_as_json_table_and_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let output = plait(&["bench", "hover", "torus", "--points", "2", "--strips", "0", "--seed", "3", "--json"]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["mesh"]["triangles"], &report["seed"]), (&6828.into(), &3.into()));
+    let number = |value: &serde_json::Value| value.as_f64().is_some_and(|n| n >= 0.0);
+    assert!(report["machine"]["cores"].as_u64().is_some_and(|n| n > 0) && number(&report["graph"]["states"]));
+    let rows = report["rows"].as_array().unwrap();
+    assert!(rows.len() > 8 && rows.iter().all(|r| ["median", "p95", "worst", "count"].iter().all(|k| number(&r[k]))));
+    std::fs::write(file("report.json"), &output.stdout).unwrap();
+    let table = plait(&["bench", "table", &file("report.json")]);
+    assert!(table.status.success() && String::from_utf8_lossy(&table.stdout).contains("| torus | 6828 |"));
+    let drawn = plait(&["bench", "plot", &file("report.json"), "--out", &file("plot.svg")]);
+    assert!(drawn.status.success() && std::fs::read_to_string(file("plot.svg")).unwrap().starts_with("<svg"));
+    let wrong = plait(&["bench", "table", &file("plot.svg")]);
+    assert!(wrong.status.code() == Some(1) && errors(&wrong).contains("is not a benchmark report"));
+}

@@ -1,10 +1,12 @@
 //! Progress of long work, and the wish to stop it.
 //!
 //! The side that works reports a stage and a fraction and asks now and then whether to go on; the side that
-//! waits reads both and may cancel. Shared by reference between threads.
+//! waits reads both and may cancel. Shared by reference between threads. How long each stage took is kept, so that
+//! whoever watches need not know the stages beforehand.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use thiserror::Error;
 
@@ -19,7 +21,45 @@ pub struct Progress {
     cancelled: AtomicBool,
     /// Fraction done, in thousandths.
     permille: AtomicU32,
-    stage: Mutex<String>,
+    stages: Mutex<Stages>,
+}
+
+/// A stage of the work and how long it has taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageTime {
+    /// The stage, as reported.
+    pub stage: String,
+    /// Seconds in it, all times together.
+    pub seconds: f64,
+    /// How often it began.
+    pub times: usize,
+}
+
+#[derive(Debug, Default)]
+struct Stages {
+    /// The stages met, in the order of their first report.
+    met: Vec<StageTime>,
+    /// Which of them was reported last.
+    now: Option<usize>,
+    /// When it began; nothing once the work is done.
+    since: Option<Instant>,
+}
+
+impl Stages {
+    fn close(&mut self) {
+        if let (Some(now), Some(since)) = (self.now, self.since.take()) {
+            self.met[now].seconds += since.elapsed().as_secs_f64();
+        }
+    }
+
+    fn open(&mut self, stage: &str) {
+        let at = self.met.iter().position(|s| s.stage == stage).unwrap_or(self.met.len());
+        if at == self.met.len() {
+            self.met.push(StageTime { stage: stage.to_owned(), seconds: 0.0, times: 0 });
+        }
+        self.met[at].times += 1;
+        (self.now, self.since) = (Some(at), Some(Instant::now()));
+    }
 }
 
 impl Progress {
@@ -47,18 +87,59 @@ impl Progress {
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 
-    /// Reports what is being done and how much of the whole is done, from 0 to 1.
+    /// Reports what is being done and how much of the whole is done, from 0 to 1. The stage lasts until another is
+    /// reported; one reported as wholly done takes no time.
     pub fn report(&self, stage: &str, fraction: f64) {
         self.permille.store((fraction.clamp(0.0, 1.0) * 1000.0) as u32, Ordering::Relaxed);
-        let mut text = self.stage.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if *text != stage {
-            stage.clone_into(&mut text);
+        let mut stages = self.stages();
+        let same = stages.now.is_some_and(|now| stages.met[now].stage == stage);
+        if !same {
+            stages.close();
+            stages.open(stage);
+        }
+        if fraction >= 1.0 {
+            stages.close();
         }
     }
 
     /// The stage and the fraction last reported.
     pub fn state(&self) -> (String, f64) {
-        let text = self.stage.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone();
+        let stages = self.stages();
+        let text = stages.now.map(|now| stages.met[now].stage.clone()).unwrap_or_default();
         (text, f64::from(self.permille.load(Ordering::Relaxed)) / 1000.0)
+    }
+
+    /// The stages so far in the order of their first report, the present one up to now.
+    pub fn stage_times(&self) -> Vec<StageTime> {
+        let stages = self.stages();
+        let mut list = stages.met.clone();
+        if let (Some(now), Some(since)) = (stages.now, stages.since) {
+            list[now].seconds += since.elapsed().as_secs_f64();
+        }
+        list
+    }
+
+    fn stages(&self) -> MutexGuard<'_, Stages> {
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_add_up_under_their_names() {
+        let progress = Progress::new();
+        assert_eq!((progress.state(), progress.stage_times()), ((String::new(), 0.0), Vec::new()));
+        for (stage, fraction) in [("a", 0.0), ("a", 0.2), ("b", 0.5), ("a", 0.75), ("done", 1.0)] {
+            progress.report(stage, fraction);
+        }
+        let times: Vec<_> = progress.stage_times().into_iter().map(|s| (s.stage, s.times)).collect();
+        assert_eq!(times, [("a".to_owned(), 2), ("b".to_owned(), 1), ("done".to_owned(), 1)]);
+        assert_eq!(progress.state(), ("done".to_owned(), 1.0));
+        let before = progress.stage_times();
+        std::thread::sleep(std::time::Duration::from_millis(2));
+        assert_eq!(progress.stage_times(), before);
     }
 }

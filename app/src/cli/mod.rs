@@ -1,5 +1,6 @@
 //! The command line: without a command the window, with one the work is done without a display.
 
+pub mod bench;
 pub mod embed;
 pub mod info;
 pub mod render;
@@ -37,6 +38,8 @@ enum Command {
     Embed(EmbedArguments),
     /// Draw a design or a mesh into a PNG file.
     Render(RenderArguments),
+    /// Time what a designer waits for.
+    Bench(bench::BenchArguments),
 }
 
 /// Arguments of `plait info`.
@@ -187,6 +190,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, opener: Arc<dyn Opener
         Some(Command::Weave(weave)) => weave::run(weave),
         Some(Command::Embed(embed)) => embed::run(embed),
         Some(Command::Render(render)) => render::run(render, &*opener),
+        Some(Command::Bench(bench)) => bench::run(bench),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -14,6 +14,7 @@ use super::kernel::{TriMesh, TriMeshError};
 use super::read;
 use super::repair::{Repair, repair};
 use super::triangulate::triangulate;
+use crate::progress::Progress;
 
 /// A mesh read from a file.
 #[derive(Debug, Clone)]
@@ -205,9 +206,21 @@ pub fn load(path: &Path) -> Result<LoadedMesh, LoadError> {
 ///
 /// The content is refused; see [`LoadError`].
 pub fn parse(bytes: &[u8], name: &str) -> Result<LoadedMesh, LoadError> {
+    parse_with(bytes, name, &Progress::new())
+}
+
+/// As [`parse`]; reports its stages.
+///
+/// # Errors
+///
+/// The content is refused; see [`LoadError`].
+pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<LoadedMesh, LoadError> {
+    progress.report("Reading", 0.0);
     let raw = read::read(bytes, name)?;
+    progress.report("Repairing", 0.4);
     let triangles = triangulate(&raw)?;
     let (positions, faces, repairs) = repair(raw, triangles)?;
+    progress.report("Connecting triangles", 0.8);
     let units = Normalization::of(&positions).ok_or(LoadError::NoSize)?;
     let mesh = TriMesh::from_faces(positions.into_iter().map(|p| units.from_file(p)).collect(), &faces)?;
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);

@@ -69,11 +69,11 @@ impl StripMap {
     ///
     /// See [`StripError`].
     pub fn new(mesh: &TriMesh, curve_of_edge: &[Option<u32>], progress: &Progress) -> Result<Self, StripError> {
+        progress.report("Cross field", 0.2);
         let metric = Metric::new(mesh);
         let paths = trace_curves(mesh, &metric, curve_of_edge)?;
-        progress.report("cross field", 0.0);
         let field = field::interpolate(mesh, &metric, &paths, &[], progress)?;
-        progress.report("strip map", 0.4);
+        progress.report("Strip map", 0.5);
         Self::along_field(mesh, &metric, &paths, field, progress)
     }
 
@@ -90,7 +90,7 @@ impl StripMap {
         progress: &Progress,
     ) -> Result<Self, StripError> {
         let map = map::solve(mesh, metric, &field, paths, progress)?;
-        progress.report("strips", 0.9);
+        progress.report("Strips", 0.9);
         let flipped: Vec<bool> = mesh.faces().map(|f| map.is_flipped(f)).collect();
         let uv = map.uv;
         let residual = residual(mesh, metric, &field, paths, &uv);

@@ -71,6 +71,7 @@ impl Model {
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&mesh);
         let sharp = features(&mesh, &options);
+        progress.report("Indexing the surface", 0.05);
         let index = Arc::new(SurfaceIndex::new(&mesh));
         progress.check()?;
         progress.report("Measuring curvature", 0.1);
@@ -81,8 +82,8 @@ impl Model {
         progress.report("Preparing the search for strips", 0.5);
         let elastica = ElasticaOptions { aligned_boundary: options.aligned_boundary, ..Default::default() };
         let graph = ElasticaGraph::build(mesh.clone(), &curvature, &sharp, &elastica, progress)?;
-        progress.report("Ready", 1.0);
         let vertex_curvatures = vertex_curvatures(&mesh);
+        progress.report("Ready", 1.0);
         Ok(Self { loaded, mesh, options, topology, sharp, curvature, vertex_curvatures, graph, index, corners })
     }
 }

@@ -40,11 +40,14 @@ impl Woven {
     ///
     /// A strip that does not lie on the mesh, or [`WeaveError::Cancelled`].
     pub fn new(model: &Model, strips: &[Strip], progress: &Progress) -> Result<Self, WeaveError> {
+        progress.report("Arranging strips", 0.0);
         let arrangement = Arrangement::new(&model.mesh, strips.iter().map(|s| &s.curve))?;
-        progress.check()?;
-        let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let mesh = arrangement.refined.to_mesh().map_err(ArrangementError::from)?;
+        progress.check()?;
+        progress.report("Assessing regions", 0.1);
+        let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
+        progress.report("Closing directions", 0.95);
         let mut spine_mask = DirectionMask::none();
         for strip in strips {
             close_along(model, strip, &mut spine_mask);
@@ -53,6 +56,7 @@ impl Woven {
         if let Some(map) = &strip_map {
             close_inside(model, &arrangement, &mesh, map, &mut mask);
         }
+        progress.report("Ready", 1.0);
         Ok(Self { arrangement, reports, mask, spine_mask, mesh, strip_map })
     }
 

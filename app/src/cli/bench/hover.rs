@@ -1,0 +1,157 @@
+//! Hovering: proposals at random points of the surface, with more and more strips placed, and along strokes of a
+//! moving pointer.
+
+use std::time::{Duration, Instant};
+
+use plait_core::elastica::{ProposalQuery, SearchWorkspace};
+use plait_core::field::Metric;
+use plait_core::progress::Progress;
+use plait_core::surface::SurfacePoint;
+use plait_core::weave::Session;
+
+use super::RunArguments;
+use super::points::Points;
+use super::report::{Report, Unit};
+use super::strips;
+
+/// A first loop is there.
+pub(super) const SHOWN: &str = "a loop shown";
+/// The search for the best alone has ended.
+pub(super) const PROVED: &str = "proved best";
+/// The search for all loops up to half as dear again has ended.
+pub(super) const ALTERNATIVES: &str = "alternatives to 1.5 × best";
+/// What the window does: the first loop, then all alternatives, relaxed.
+const ALL: &str = "all proposals, relaxed";
+
+/// Points of one stroke of the pointer.
+const STROKE: usize = 25;
+/// Distance between them, for a surface of bounding-box diagonal 1: some pixels of a window.
+const STEP: f64 = 0.004;
+
+/// The group of the rows with so many strips placed.
+pub(super) fn group(strips: usize) -> String {
+    format!("hover, {strips} strips")
+}
+
+/// Times proposals before and after strips are placed.
+pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
+    let mut counts = arguments.strips.clone();
+    counts.sort_unstable();
+    counts.dedup();
+    let mut placements = strips::Placements::new(session, arguments.seed);
+    for count in counts {
+        while session.design().strips.len() < count {
+            if !placements.place(session, |s, proposal, progress| s.place(proposal, progress))? {
+                return Ok(());
+            }
+        }
+        searches(session, arguments, &group(count), report)?;
+        if !arguments.search_only {
+            pointer(session, arguments, &group(count), report)?;
+        }
+    }
+    Ok(())
+}
+
+/// The search alone, at random points. Never inlined: `scripts/instructions.sh` counts what it executes.
+#[inline(never)]
+fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
+    let (model, mask) = (session.model(), &session.woven().mask);
+    let progress = Progress::new();
+    let mut work = SearchWorkspace::new();
+    let start = Instant::now();
+    work.prepare(&model.graph, mask, &progress)?;
+    if !model.topology.boundary_loops.is_empty() {
+        report.add_times(group, "ways to the boundary, once", &[start.elapsed()]);
+    }
+    let mut figures = Figures::default();
+    let mut points = Points::new(&model.mesh, arguments.seed);
+    let start = Instant::now();
+    for _ in 0..arguments.points {
+        let vertex = points.point().nearest_vertex(&model.mesh);
+        let now = Instant::now();
+        let mut shown = None;
+        let query = ProposalQuery::cheapest(vertex, mask);
+        let best =
+            model.graph.proposals_with(&query, &mut work, &progress, |l| shown = Some((now.elapsed(), l.cost)))?;
+        figures.proved.push(now.elapsed());
+        figures.settled.push(best.settled as f64);
+        let now = Instant::now();
+        let query = ProposalQuery::alternatives(vertex, mask);
+        let all = model.graph.proposals(&query, &mut work, &progress)?;
+        figures.alternatives.push(now.elapsed());
+        figures.settled_all.push(all.settled as f64);
+        figures.loops.push(all.loops.len() as f64);
+        figures.unproved += f64::from(u8::from(!(best.proved && all.proved)));
+        if let (Some((at, cost)), Some(best)) = (shown, best.loops.first()) {
+            figures.shown.push(at);
+            figures.excess.push(cost / best.cost);
+        }
+        if start.elapsed() > arguments.limit() {
+            break;
+        }
+    }
+    figures.write(report, group);
+    Ok(())
+}
+
+#[derive(Default)]
+struct Figures {
+    shown: Vec<Duration>,
+    proved: Vec<Duration>,
+    alternatives: Vec<Duration>,
+    /// Cost of the loop shown over that of the best.
+    excess: Vec<f64>,
+    loops: Vec<f64>,
+    settled: Vec<f64>,
+    settled_all: Vec<f64>,
+    unproved: f64,
+}
+
+impl Figures {
+    fn write(self, report: &mut Report, group: &str) {
+        report.add_times(group, SHOWN, &self.shown);
+        report.add_times(group, PROVED, &self.proved);
+        report.add_times(group, ALTERNATIVES, &self.alternatives);
+        let searched = !self.proved.is_empty();
+        let numbers = [
+            ("cost of the loop shown / best", self.excess),
+            ("loops proposed", self.loops),
+            ("states settled for the best", self.settled),
+            ("states settled for all", self.settled_all),
+            ("points not proved in time", if searched { vec![self.unproved] } else { Vec::new() }),
+        ];
+        for (what, values) in numbers {
+            report.add(group, what, Unit::Number, values);
+        }
+    }
+}
+
+/// What the window does, at random points and along strokes.
+fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
+    let mesh = session.model().mesh.clone();
+    let metric = Metric::new(&mesh);
+    let mut points = Points::new(&mesh, arguments.seed);
+    let apart: Vec<SurfacePoint> = (0..arguments.points).map(|_| points.point()).collect();
+    let strokes = arguments.points.div_ceil(STROKE);
+    let moving: Vec<SurfacePoint> =
+        (0..strokes).flat_map(|_| points.stroke(&mesh, &metric, STROKE, STEP)).take(arguments.points).collect();
+    for (name, list) in [("pointer", apart), ("moving pointer", moving)] {
+        let (mut shown, mut all) = (Vec::new(), Vec::new());
+        let progress = Progress::new();
+        let start = Instant::now();
+        for at in list {
+            let now = Instant::now();
+            let mut first = None;
+            session.proposals_with(at, &progress, |_| first = Some(now.elapsed()))?;
+            all.push(now.elapsed());
+            shown.extend(first);
+            if start.elapsed() > arguments.limit() {
+                break;
+            }
+        }
+        report.add_times(group, &format!("{name}: {SHOWN}"), &shown);
+        report.add_times(group, &format!("{name}: {ALL}"), &all);
+    }
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! The mesh that is measured: a file, a built-in model, or one of these subdivided.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use plait_core::mesh::{
+    LoadedMesh, MeshSource, SHARP_DIHEDRAL, load, parse_with, sharp_edges, subdivided, write_mesh_obj,
+};
+use plait_core::progress::Progress;
+
+/// What is opened. Only a file as it is has to be read from disk; all else is kept as the text of an OBJ file.
+#[derive(Debug)]
+pub(super) enum Input {
+    File(PathBuf),
+    Memory { name: String, obj: Vec<u8> },
+}
+
+impl Input {
+    /// The file at `path`, or else the built-in model of this name, every triangle cut in four `levels` times.
+    pub(super) fn new(path: &Path, levels: u32) -> anyhow::Result<Self> {
+        let source = MeshSource::from_name(&path.to_string_lossy());
+        let is_file = matches!(source, MeshSource::File(_));
+        let mut loaded = if is_file { load(path) } else { source.load(Path::new("")) }
+            .with_context(|| path.display().to_string())?;
+        if is_file && levels == 0 {
+            return Ok(Self::File(path.to_owned()));
+        }
+        let mut crease = sharp_edges(&loaded.mesh, SHARP_DIHEDRAL);
+        for _ in 0..levels {
+            (loaded.mesh, crease) = subdivided(&loaded.mesh, &crease)?;
+        }
+        let mut obj = Vec::new();
+        write_mesh_obj(&mut obj, &loaded.mesh, &loaded.units)?;
+        Ok(Self::Memory { name: format!("{}.obj", loaded.name), obj })
+    }
+
+    /// Opens it.
+    pub(super) fn load(&self, progress: &Progress) -> anyhow::Result<LoadedMesh> {
+        let loaded = match self {
+            Self::File(path) => {
+                progress.report("Reading", 0.0);
+                let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
+                parse_with(&bytes, &name, progress)
+            }
+            Self::Memory { name, obj } => parse_with(obj, name, progress),
+        };
+        Ok(loaded?)
+    }
+
+    /// What a design on it would call its mesh.
+    pub(super) fn source(&self) -> MeshSource {
+        match self {
+            Self::File(path) => MeshSource::File(path.clone()),
+            Self::Memory { name, .. } => MeshSource::File(name.into()),
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! The facts of the machine and of the program that figures depend on.
+
+use serde::{Deserialize, Serialize};
+
+/// What figures were measured on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Machine {
+    /// The processor's name, where the system tells it.
+    pub(super) processor: Option<String>,
+    /// Cores that the program may use.
+    pub(super) cores: usize,
+    /// Memory in bytes, where the system tells it.
+    pub(super) memory: Option<u64>,
+    /// Operating system and architecture.
+    pub(super) system: String,
+}
+
+impl Machine {
+    /// This machine.
+    pub(super) fn here() -> Self {
+        let processor = field("/proc/cpuinfo", "model name");
+        Self {
+            processor,
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            memory: field("/proc/meminfo", "MemTotal").and_then(|t| kilobytes(&t)),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        }
+    }
+}
+
+/// Version of the program, and how far its compiler went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Program {
+    version: String,
+    optimisation: String,
+}
+
+impl Program {
+    /// This program.
+    pub(super) fn here() -> Self {
+        Self { version: env!("CARGO_PKG_VERSION").into(), optimisation: env!("PLAIT_OPT_LEVEL").into() }
+    }
+}
+
+impl std::fmt::Display for Program {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "plait {}, optimisation level {}", self.version, self.optimisation)
+    }
+}
+
+/// The most memory this process has held so far, in bytes, where the system tells it.
+pub(super) fn peak_memory() -> Option<u64> {
+    field("/proc/self/status", "VmHWM").and_then(|t| kilobytes(&t))
+}
+
+/// The value of the first line `name: value` of a file.
+fn field(path: &str, name: &str) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let value = |line: &str| line.split_once(':').filter(|(n, _)| n.trim() == name).map(|(_, v)| v.trim().to_owned());
+    text.lines().find_map(value)
+}
+
+fn kilobytes(text: &str) -> Option<u64> {
+    text.strip_suffix("kB")?.trim().parse::<u64>().ok().map(|n| n * 1024)
+}

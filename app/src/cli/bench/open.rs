@@ -1,0 +1,29 @@
+//! Opening: from the file to a model that is ready to be woven on.
+
+use plait_core::weave::{Model, Options};
+
+use super::RunArguments;
+use super::input::Input;
+use super::report::{Report, Staged};
+
+/// The group of the rows.
+pub(super) const GROUP: &str = "open";
+/// All stages together.
+pub(super) const READY: &str = "opened and ready";
+
+/// Opens the input several times.
+pub(super) fn measure(input: &Input, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
+    let mut staged = Staged::default();
+    for _ in 0..arguments.repeats {
+        let model = staged.time(|progress| -> anyhow::Result<Model> {
+            let loaded = input.load(progress)?;
+            Ok(Model::prepare(loaded, Options::default(), progress)?)
+        })?;
+        drop(model);
+        if staged.spent() > arguments.limit() {
+            break;
+        }
+    }
+    staged.write(report, GROUP, READY);
+    Ok(())
+}

@@ -11,6 +11,7 @@ mod straightest;
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
 pub use index::SurfaceIndex;
+pub(crate) use index::nearest_in_triangle;
 pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
 pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};

@@ -6,12 +6,10 @@
 //! move features and boundaries along themselves, leave every triangle the right way up in the flat star and in
 //! space, and fairly round. As the vertex that stays does not move, vertices stay on the original surface.
 //!
-//! The queue holds one entry per vertex, a lower bound of its cost: what comes out on top is measured then, and
-//! goes back if it costs more. What cannot go is asked again once a neighbour has gone. The bounds on shape are
-//! loosened in passes, as long as the target is not reached.
-
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+//! Instead of a queue there are sweeps over all vertices, each with a higher ceiling of cost: nearly the same order, but
+//! neighbours in memory are visited together, which is several times faster on large meshes. A vertex that costs more
+//! than the ceiling waits for it; one that cannot go is asked again once a neighbour has gone. The bounds on shape
+//! are loosened in passes, as long as the target is not reached.
 
 use glam::{DVec2, DVec3};
 
@@ -50,6 +48,12 @@ const PASSES: [Limits; 3] = [
     Limits { roundness: 0.05, length: 6.0, degree: 12, turn: 0.5 },
 ];
 
+/// By how much the ceiling rises from sweep to sweep: edges collapse in the order of their lengths up to 10 %.
+const RISE: f64 = 1.2;
+
+/// The first ceiling in squared even lengths; edges shorter than a thousandth go in any order.
+const FIRST_CEILING: f64 = 1e-6;
+
 /// The simplification as far as it is.
 pub(super) struct Simplifier<'a> {
     pub positions: &'a [DVec3],
@@ -61,9 +65,8 @@ pub(super) struct Simplifier<'a> {
     quadrics: Vec<Quadric>,
     /// Side length of triangles of even size at the target.
     length: f64,
-    /// Cost under which a vertex waits in the queue, as the bits of a positive `f32`; `NONE` if it does not.
-    queued: Vec<u32>,
-    queue: BinaryHeap<Reverse<(u32, u32)>>,
+    /// A lower bound of the cost of each vertex; infinite where it cannot go.
+    waits: Vec<f32>,
     /// The last star each vertex was in.
     mark: Vec<u32>,
     stamp: u32,
@@ -85,8 +88,7 @@ impl<'a> Simplifier<'a> {
             star: Star::default(),
             quadrics: quadrics(mesh, sharp),
             length,
-            queued: vec![NONE; n],
-            queue: BinaryHeap::new(),
+            waits: vec![f32::INFINITY; n],
             mark: vec![0; n],
             stamp: 0,
             candidates: Vec::new(),
@@ -99,31 +101,45 @@ impl<'a> Simplifier<'a> {
     pub fn reduce(&mut self, target: usize, progress: &Progress) -> Result<(), Cancelled> {
         let from = self.mesh.n_faces();
         for limits in PASSES {
-            self.fill_queue();
-            let mut count = 0u32;
+            let mut vertices = self.movable();
+            let mut ceiling = FIRST_CEILING * self.length * self.length;
             while self.mesh.n_faces() > target {
-                let Some(Reverse((bits, v))) = self.queue.pop() else { break };
-                if self.queued[v as usize] != bits || !self.mesh.has_vertex(v) {
-                    continue;
+                progress.check()?;
+                progress.report("Simplifying", (from - self.mesh.n_faces()) as f64 / (from - target) as f64);
+                self.sweep(&vertices, ceiling as f32, &limits, target, progress)?;
+                vertices.retain(|&v| self.mesh.has_vertex(v));
+                let least = vertices.iter().map(|&v| self.waits[v as usize]).fold(f32::INFINITY, f32::min);
+                if least == f32::INFINITY {
+                    break;
                 }
-                self.queued[v as usize] = NONE;
-                let Some((cost, k)) = self.best(v, &limits) else { continue };
-                let bits_now = (cost as f32).to_bits();
-                if bits_now > bits && self.queue.peek().is_some_and(|Reverse(top)| top.0 < bits_now) {
-                    self.enqueue(v, bits_now);
-                    continue;
-                }
-                self.collapse(v, k, bits);
-                count += 1;
-                // Every few milliseconds.
-                if count.is_multiple_of(4096) {
-                    progress.check()?;
-                    let done = (from - self.mesh.n_faces()) as f64 / (from - target) as f64;
-                    progress.report("Simplifying", done);
-                }
+                ceiling = RISE * ceiling.max(f64::from(least));
             }
-            self.queue.clear();
-            self.queued.fill(NONE);
+        }
+        Ok(())
+    }
+
+    /// Collapses the vertices that cost no more than `ceiling`.
+    fn sweep(
+        &mut self,
+        vertices: &[u32],
+        ceiling: f32,
+        limits: &Limits,
+        target: usize,
+        progress: &Progress,
+    ) -> Result<(), Cancelled> {
+        for (count, &v) in vertices.iter().enumerate() {
+            // A few milliseconds of work.
+            if count % 4096 == 4095 {
+                progress.check()?;
+            }
+            if self.waits[v as usize] > ceiling || !self.mesh.has_vertex(v) {
+                continue;
+            }
+            match self.best(v, limits) {
+                Some((cost, k)) if cost as f32 <= ceiling => self.collapse(v, k),
+                Some((cost, _)) => self.waits[v as usize] = cost as f32,
+                None => self.waits[v as usize] = f32::INFINITY,
+            }
             if self.mesh.n_faces() <= target {
                 break;
             }
@@ -131,24 +147,18 @@ impl<'a> Simplifier<'a> {
         Ok(())
     }
 
-    fn enqueue(&mut self, v: u32, bits: u32) {
-        self.queued[v as usize] = bits;
-        self.queue.push(Reverse((bits, v)));
-    }
-
-    fn fill_queue(&mut self) {
-        for v in 0..self.kinds.len() as u32 {
-            if !self.mesh.has_vertex(v) || self.kinds[v as usize] == Kind::Corner {
-                continue;
-            }
+    /// The vertices that may go, each waiting for its shortest edge.
+    fn movable(&mut self) -> Vec<u32> {
+        let free = |v: &u32| self.mesh.has_vertex(*v) && self.kinds[*v as usize] != Kind::Corner;
+        let vertices: Vec<u32> = (0..self.kinds.len() as u32).filter(free).collect();
+        for &v in &vertices {
             let mut least = f64::INFINITY;
-            let mesh = &self.mesh;
-            mesh.for_neighbours(v, |b| {
-                let length = self.positions[b as usize].distance_squared(self.positions[v as usize]);
-                least = least.min(length);
+            self.mesh.for_neighbours(v, |b| {
+                least = least.min(self.positions[b as usize].distance_squared(self.positions[v as usize]));
             });
-            self.enqueue(v, (least as f32).to_bits());
+            self.waits[v as usize] = least as f32;
         }
+        vertices
     }
 
     /// The cheapest collapse of `v` that is allowed: its cost and the neighbour, by position in the star's ring.
@@ -177,7 +187,7 @@ impl<'a> Simplifier<'a> {
         self.candidates
             .iter()
             .copied()
-            .find(|&(_, k)| self.keeps_topology(v, k, limits) && self.keeps_shape(v, k, limits))
+            .find(|&(_, k)| self.keeps_shape(v, k, limits) && self.keeps_topology(v, k, limits))
     }
 
     fn keeps_topology(&self, v: u32, k: usize, limits: &Limits) -> bool {
@@ -186,12 +196,11 @@ impl<'a> Simplifier<'a> {
         let n = star.ring.len();
         // The ring vertices beside `b`: the third corners of the triangles at the edge.
         let beside = [(star.closed || k > 0).then(|| (k + n - 1) % n), (star.closed || k + 1 < n).then(|| (k + 1) % n)];
-        let (mut common, mut degree) = (0, 0);
+        let mut common = 0;
         self.mesh.for_neighbours(b, |c| {
-            degree += 1;
             common += usize::from(self.mark[c as usize] == self.stamp);
         });
-        if common != beside.iter().flatten().count() || degree + n - 2 - common > limits.degree {
+        if common != beside.iter().flatten().count() || self.mesh.degree(b) + n - 2 - common > limits.degree {
             return false;
         }
         beside.iter().flatten().all(|&i| {
@@ -264,7 +273,7 @@ impl<'a> Simplifier<'a> {
         new <= longest || new <= old
     }
 
-    fn collapse(&mut self, v: u32, k: usize, bits: u32) {
+    fn collapse(&mut self, v: u32, k: usize) {
         let star = &self.star;
         let b = star.ring[k];
         self.points.clear();
@@ -284,10 +293,9 @@ impl<'a> Simplifier<'a> {
         }
         let gone = self.quadrics[v as usize];
         self.quadrics[b as usize].add(&gone);
-        for i in 0..self.star.ring.len() {
-            let c = self.star.ring[i];
-            if self.queued[c as usize] == NONE && self.kinds[c as usize] != Kind::Corner {
-                self.enqueue(c, bits);
+        for &c in &self.star.ring {
+            if self.waits[c as usize] == f32::INFINITY && self.kinds[c as usize] != Kind::Corner {
+                self.waits[c as usize] = 0.0;
             }
         }
     }

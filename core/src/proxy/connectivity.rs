@@ -28,13 +28,20 @@ pub(super) struct Connectivity {
     feature: Vec<bool>,
     /// One outgoing half-edge of each vertex, the boundary one if there is one.
     spoke: Vec<u32>,
+    /// Number of edges at each vertex.
+    degree: Vec<u32>,
     n_faces: usize,
 }
 
 impl Connectivity {
     /// A copy of `mesh` with these edges as features.
     pub fn new(mesh: &TriMesh, sharp: &[bool]) -> Self {
+        let mut degree = vec![0; mesh.n_vertices()];
+        for e in mesh.edges() {
+            mesh.edge_vertices(e).iter().for_each(|v| degree[v.index()] += 1);
+        }
         Self {
+            degree,
             origin: mesh.halfedges().map(|h| mesh.origin(h).0).collect(),
             twin: mesh.halfedges().map(|h| mesh.twin(h).map_or(NONE, |t| t.0)).collect(),
             feature: mesh.halfedges().map(|h| sharp[mesh.edge(h).index()]).collect(),
@@ -133,15 +140,17 @@ impl Connectivity {
     }
 
     /// Number of edges at a vertex.
+    #[inline]
     pub fn degree(&self, v: u32) -> usize {
-        let mut n = 0;
-        self.for_neighbours(v, |_| n += 1);
-        n
+        self.degree[v as usize] as usize
     }
 
     /// Collapses the edge from `a` to `b` into `b`, given all `spokes` of `a` and the one or two faces at the edge.
     /// The link condition holds.
     pub fn collapse(&mut self, spokes: &[u32], a: u32, b: u32) {
+        // The edge itself goes, and of each pair that meets at a third corner one.
+        self.degree[b as usize] += self.degree[a as usize];
+        self.degree[b as usize] -= 2;
         for &h in spokes {
             self.origin[h as usize] = b;
         }
@@ -155,6 +164,8 @@ impl Connectivity {
             let (x, y) = (self.twin[next(loop_side) as usize], self.twin[prev(loop_side) as usize]);
             let feature = self.feature[next(loop_side) as usize] || self.feature[prev(loop_side) as usize];
             let c = self.origin[prev(loop_side) as usize];
+            self.degree[b as usize] -= 1;
+            self.degree[c as usize] -= 1;
             for (s, other) in [(x, y), (y, x)] {
                 if s != NONE {
                     self.twin[s as usize] = other;
@@ -206,6 +217,9 @@ impl Connectivity {
         let (a, b) = (self.origin(h), self.origin(g));
         let (c, d) = (self.origin(prev(h)), self.origin(prev(g)));
         let (f, e) = (h - h % 3, g - g % 3);
+        for (v, change) in [(a, -1), (b, -1), (c, 1), (d, 1)] {
+            self.degree[v as usize] = self.degree[v as usize].wrapping_add_signed(change);
+        }
         // Old outer sides: b c, c a, a d, d b, with twin and feature; and where they go.
         let old = [next(h), prev(h), next(g), prev(g)].map(|s| (self.twin[s as usize], self.feature[s as usize]));
         let new = [e + 1, f, f + 1, e];
@@ -235,6 +249,7 @@ impl Connectivity {
             self.origin[h as usize] = w;
         }
         self.spoke[w as usize] = self.spoke[v as usize];
+        self.degree[w as usize] = self.degree[v as usize];
         self.spoke[v as usize] = NONE;
     }
 }

@@ -66,8 +66,16 @@ impl Proxy {
     pub fn to_proxy(&self, original: &TriMesh, point: SurfacePoint) -> SurfacePoint {
         let corners = original.face_vertices(point.face);
         let target = corners.iter().zip(point.weights).map(|(v, w)| self.places[v.index()] * w).sum();
-        let start = self.images[point.nearest_vertex(original).index()].face;
-        nearest_from(&self.mesh, self.mesh.positions(), start, target).0
+        let mut order = [0, 1, 2];
+        order.sort_by(|&i, &j| point.weights[j].total_cmp(&point.weights[i]));
+        let starts = order.into_iter().map(|i| self.images[corners[i].index()]);
+        let near = starts.map(|p| (p.nearest_vertex(&self.mesh), self.found(p.face)));
+        nearest_near(&self.mesh, self.mesh.positions(), near, target).unwrap_or(point)
+    }
+
+    /// The squared distance at which a point counts as found around a face of the proxy.
+    fn found(&self, face: FaceId) -> f64 {
+        FOUND * FOUND * self.mesh.vector(self.mesh.face_halfedges(face)[0]).length_squared()
     }
 
     /// The point of the original for a point of the proxy.
@@ -86,19 +94,9 @@ impl Proxy {
                 }
             }
         }
-        let found = FOUND * FOUND * self.mesh.vector(self.mesh.face_halfedges(point.face)[0]).length_squared();
-        let mut best = (point, f64::INFINITY);
-        for (_, v) in starts.into_iter().filter(|s| s.0 < f64::INFINITY) {
-            let start = original.face(original.vertex_halfedge(v));
-            let here = nearest_from(original, &self.places, start, target);
-            if here.1 < best.1 {
-                best = here;
-            }
-            if best.1 <= found {
-                break;
-            }
-        }
-        best.0
+        let found = self.found(point.face);
+        let near = starts.into_iter().filter(|s| s.0 < f64::INFINITY).map(|s| (s.1, found));
+        nearest_near(original, &self.places, near, target).unwrap_or(point)
     }
 
     /// Puts a finished simplification together.
@@ -182,21 +180,46 @@ fn projected(mesh: &TriMesh, tracked: SurfacePoint, position: DVec3, normal: DVe
     if mesh.face_normal(nearest.face).dot(normal) > 0.0 && moved < size { nearest } else { tracked }
 }
 
+/// The best of what is found downhill from around some vertices, tried in order until one is found as near as wanted
+/// (squared).
+fn nearest_near(
+    mesh: &TriMesh,
+    positions: &[DVec3],
+    starts: impl Iterator<Item = (VertexId, f64)>,
+    target: DVec3,
+) -> Option<SurfacePoint> {
+    let mut best: Option<(SurfacePoint, f64)> = None;
+    for (v, found) in starts {
+        let fan = mesh.outgoing(v).map(|h| measure(mesh, positions, mesh.face(h), target));
+        let Some((start, _)) = fan.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+        let here = nearest_from(mesh, positions, start.face, target);
+        if best.is_none_or(|b| here.1 < b.1) {
+            best = Some(here);
+        }
+        if here.1 <= found {
+            break;
+        }
+    }
+    best.map(|b| b.0)
+}
+
+/// The nearest point of a face, and its squared distance.
+fn measure(mesh: &TriMesh, positions: &[DVec3], face: FaceId, target: DVec3) -> (SurfacePoint, f64) {
+    let corners = mesh.face_vertices(face).map(|v| positions[v.index()]);
+    let weights = nearest_in_triangle(target, &corners);
+    let place: DVec3 = corners.iter().zip(weights).map(|(&p, w)| p * w).sum();
+    (SurfacePoint { face, weights }, place.distance_squared(target))
+}
+
 /// Goes downhill from a face to the point nearest to `target`, over the mesh with its vertices at `positions`; with the
 /// squared distance that is left.
-pub(super) fn nearest_from(mesh: &TriMesh, positions: &[DVec3], start: FaceId, target: DVec3) -> (SurfacePoint, f64) {
-    let measure = |face: FaceId| {
-        let corners = mesh.face_vertices(face).map(|v| positions[v.index()]);
-        let weights = nearest_in_triangle(target, &corners);
-        let place: DVec3 = corners.iter().zip(weights).map(|(&p, w)| p * w).sum();
-        (SurfacePoint { face, weights }, place.distance_squared(target))
-    };
-    let mut here = measure(start);
+fn nearest_from(mesh: &TriMesh, positions: &[DVec3], start: FaceId, target: DVec3) -> (SurfacePoint, f64) {
+    let mut here = measure(mesh, positions, start, target);
     loop {
         let (point, distance) = here;
         let mut best = here;
         let mut meet = |face: FaceId| {
-            let there = measure(face);
+            let there = measure(mesh, positions, face, target);
             if there.1 < best.1 {
                 best = there;
             }

@@ -8,6 +8,7 @@
 
 mod collapse;
 mod connectivity;
+mod curve;
 mod improve;
 mod map;
 mod quadric;
@@ -20,6 +21,7 @@ use crate::mesh::{TriMesh, TriMeshError};
 use crate::progress::{Cancelled, Progress};
 use collapse::Simplifier;
 
+pub use curve::CarryError;
 pub use map::Proxy;
 
 /// Rounds of flips and shifts half way and at the end. Each gains less than the one before; after these the
@@ -76,3 +78,6 @@ impl Proxy {
         Self::finish(original, &work, &normals, progress)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,5 +14,7 @@ pub use index::SurfaceIndex;
 pub(crate) use index::nearest_in_triangle;
 pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
+#[cfg(test)]
+pub(crate) use relax::testing;
 pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
 pub use straightest::{PolarMap, Trace, straightest};

@@ -239,7 +239,8 @@ impl<'a> Simplifier<'a> {
             let area = (flat[1] - flat[0]).perp_dot(flat[2] - flat[0]);
             let size = (flat[1] - flat[0]).length_squared().max((flat[2] - flat[0]).length_squared());
             // The flat triangle must be fairly round too, so that points in it are well placed.
-            if !(area > 0.25 * limits.roundness * size) {
+            let upright = area > 0.25 * limits.roundness * size;
+            if !upright {
                 return false;
             }
             let [c, d] = [i, j].map(|i| star.ring[i] as usize);
@@ -261,11 +262,11 @@ impl<'a> Simplifier<'a> {
             return false;
         }
         // A degenerate triangle has no normal to keep.
-        if was != DVec3::ZERO && !(normal.dot(was) > limits.turn) {
+        if was != DVec3::ZERO && normal.dot(was) <= limits.turn {
             return false;
         }
         // The turns of many steps add up; the normals of the original at the corners do not.
-        if ids.iter().any(|&i| self.kinds[i] == Kind::Smooth && !(self.normals[i].dot(normal) > 0.5 * limits.turn)) {
+        if ids.iter().any(|&i| self.kinds[i] == Kind::Smooth && self.normals[i].dot(normal) <= 0.5 * limits.turn) {
             return false;
         }
         let old = (p - x).length_squared().max((p - y).length_squared());

@@ -21,8 +21,10 @@ const VERTEX_DISTANCE: f64 = 1e-3;
 const STARTS: usize = 12;
 /// Triangles around a start in which an edge between the sides is looked for.
 const AROUND: usize = 200;
-/// The carried curve must not be longer than this many times the curve.
-const LONGEST: f64 = 1.5;
+/// Crossings after the start within which the walk may join its own way.
+const JOIN: usize = 200;
+/// The carried curve is as long as the curve up to this factor.
+const LENGTH_FACTOR: f64 = 1.6;
 
 /// Why a curve cannot be carried to the original.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -33,9 +35,9 @@ pub enum CarryError {
     /// The original has no strip of triangles along the curve that closes, or that ends where the curve does.
     #[error("the curve has no counterpart on the original")]
     Lost,
-    /// The strip is much longer than the curve: the original is too rough there.
+    /// The curve found is of quite another length: the original is too rough there.
     #[error("on the original the curve would be {ratio:.1} times as long")]
-    TooLong {
+    Length {
         /// Its length there by its length on the proxy.
         ratio: f64,
     },
@@ -211,12 +213,14 @@ impl Walker<'_> {
     }
 
     /// Walks from a half-edge, near a place on the guide, until the curve is closed or at the boundary.
-    fn walk(&self, (first, at): (HalfedgeId, f64)) -> Result<SurfaceCurve, CarryError> {
+    fn walk(&self, (mut first, at): (HalfedgeId, f64)) -> Result<SurfaceCurve, CarryError> {
         let (mesh, guide) = (self.original, self.guide);
         let n = guide.segments.len() as f64;
         let mut ends = [mesh.origin(first), mesh.target(first)].map(|v| (v, self.side(v, at).distance));
         let (mut h, mut at, mut gone, mut length) = (first, at, 0.0, 0.0);
         let mut crossings = Vec::new();
+        // How far the walk had come at each of the first crossings.
+        let mut come = Vec::new();
         let mut last: Option<DVec3> = None;
         loop {
             let (p, q) = (self.places[ends[0].0.index()], self.places[ends[1].0.index()]);
@@ -229,6 +233,9 @@ impl Walker<'_> {
             length += last.map_or(0.0, |l| l.distance(place));
             last = Some(place);
             crossings.push(Crossing { halfedge: h, t });
+            if come.len() < JOIN {
+                come.push(gone);
+            }
             let entered = if !guide.closed && crossings.len() == 1 { Some(h) } else { mesh.twin(h) };
             let Some(g) = entered else { break };
             // Between the sides: `g` has left at its origin, right at its target.
@@ -239,6 +246,16 @@ impl Walker<'_> {
             if guide.closed && h == first || crossings.len() > mesh.n_edges() || gone.abs() > 1.5 * n + 3.0 {
                 break;
             }
+            // Where the original is rough, the walk may meet its own way a little after the start only.
+            if guide.closed && gone > n - 0.5 {
+                let met = crossings.iter().zip(&come).position(|(c, &at)| c.halfedge == h && gone - at > 0.5 * n);
+                if let Some(i) = met {
+                    gone -= come[i];
+                    crossings.drain(..i);
+                    first = h;
+                    break;
+                }
+            }
         }
         let whole = if guide.closed { h == first } else { mesh.twin(h).is_none() };
         // A whole turn or way ends where it began up to the size of an edge; there is no half one.
@@ -246,8 +263,8 @@ impl Walker<'_> {
             return Err(CarryError::Lost);
         }
         let ratio = length / guide.length().max(f64::MIN_POSITIVE);
-        if ratio > LONGEST {
-            return Err(CarryError::TooLong { ratio });
+        if !(1.0 / LENGTH_FACTOR..LENGTH_FACTOR).contains(&ratio) {
+            return Err(CarryError::Length { ratio });
         }
         Ok(SurfaceCurve { crossings, closed: guide.closed })
     }

@@ -52,7 +52,7 @@ impl Simplifier<'_> {
         let [a, b, c, d] = flat;
         let angle = |p: DVec2| (a - p).perp_dot(b - p).abs().atan2((a - p).dot(b - p));
         // The slack leaves regular grids as they are.
-        if !(angle(c) + angle(d) > std::f64::consts::PI + 1e-3) {
+        if angle(c) + angle(d) <= std::f64::consts::PI + 1e-3 {
             return;
         }
         let small = |v: u32| self.mesh.degree(v) <= if self.mesh.is_boundary(v) { 3 } else { 4 };
@@ -118,12 +118,13 @@ impl Simplifier<'_> {
             let j = star.after(i);
             let (x, y) = (star.flat[i] - place, star.flat[j] - place);
             // As for collapses: points in the flat triangle must be well placed.
-            if !(x.perp_dot(y) > 0.05 * x.length_squared().max(y.length_squared())) {
+            let upright = x.perp_dot(y) > 0.05 * x.length_squared().max(y.length_squared());
+            if !upright {
                 return false;
             }
             let [x, y] = [i, j].map(|i| self.positions[star.ring[i] as usize]);
             let normals = [p, q].map(|o| (x - o).cross(y - o).normalize_or_zero());
-            if !(normals[0].dot(normals[1]) > 0.8) {
+            if normals[0].dot(normals[1]) <= 0.8 {
                 return false;
             }
             before = before.min(roundness([p, x, y]));

@@ -108,17 +108,18 @@ impl Proxy {
     ) -> Result<Self, ProxyError> {
         let (mesh, vertices, face_of) = compact(original, &work.mesh)?;
         let sharp = features(&mesh, &work.mesh, &face_of);
-        let mut images = Vec::with_capacity(original.n_vertices());
-        for v in original.vertices() {
+        let tracked = |v: VertexId| {
             let (slot, weights) = work.tracked.place(v.0).unwrap_or_else(|| {
                 let h = work.mesh.spoke(v.0);
                 (h / 3, [0, 1, 2].map(|i| f64::from(i == h % 3)))
             });
-            let tracked = SurfacePoint { face: FaceId(face_of[slot as usize]), weights };
+            SurfacePoint { face: FaceId(face_of[slot as usize]), weights }
+        };
+        let mut images = Vec::with_capacity(original.n_vertices());
+        for v in original.vertices() {
             let smooth = work.kinds[v.index()] == Kind::Smooth && !work.mesh.has_vertex(v.0);
-            let image =
-                if smooth { projected(&mesh, tracked, original.position(v), normals[v.index()]) } else { tracked };
-            images.push(image);
+            let normal = normals[v.index()];
+            images.push(if smooth { projected(&mesh, tracked(v), original.position(v), normal) } else { tracked(v) });
             if v.0.is_multiple_of(1 << 16) {
                 progress.check()?;
                 progress.report("Mapping", v.index() as f64 / original.n_vertices() as f64);
@@ -235,9 +236,10 @@ fn nearest_from(mesh: &TriMesh, positions: &[DVec3], start: FaceId, target: DVec
             }
         }
         // Strictly downhill, with room for rounding, so it ends.
-        if !(best.1 < distance * (1.0 - 1e-9)) {
+        if best.1 < distance * (1.0 - 1e-9) {
+            here = best;
+        } else {
             return here;
         }
-        here = best;
     }
 }

@@ -7,7 +7,7 @@
 //! space, and fairly round. As the vertex that stays does not move, vertices stay on the original surface.
 //!
 //! Instead of a queue there are sweeps over all vertices, each with a higher ceiling of cost: nearly the same order, but
-//! neighbours in memory are visited together, which is several times faster on large meshes. A vertex that costs more
+//! neighbours in memory are visited together, which is much faster on large meshes. A vertex that costs more
 //! than the ceiling waits for it; one that cannot go is asked again once a neighbour has gone. The bounds on shape
 //! are loosened in passes, as long as the target is not reached.
 
@@ -21,7 +21,7 @@ use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
 /// Weight of the squared distance to the planes against the squared length. On a sphere a triangle of side `L` is off by
-/// some `L²/8R`; at 100 this counts as much as the length itself where `R = L`, and little above `R = 4 L`.
+/// some `L²/8R`; at 100 this counts as much as the length itself where `R = 1.25 L`, and a tenth of it where `R = 4 L`.
 const DISTANCE_WEIGHT: f64 = 100.0;
 
 /// A feature must not turn by more than 40° when a vertex of it goes.

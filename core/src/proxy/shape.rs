@@ -21,7 +21,6 @@ pub(super) enum Kind {
 /// The kind of each vertex.
 pub(super) fn kinds(mesh: &TriMesh, sharp: &[bool]) -> Vec<Kind> {
     let kind = |v| {
-        let marked = |e| sharp[usize::min(mesh.edge(e).index(), sharp.len() - 1)];
         let mut ends = [DVec3::ZERO; 2];
         let mut n = 0;
         let mut meet = |arm: DVec3| {
@@ -30,7 +29,7 @@ pub(super) fn kinds(mesh: &TriMesh, sharp: &[bool]) -> Vec<Kind> {
             }
             n += 1;
         };
-        for h in mesh.outgoing(v).filter(|&h| mesh.twin(h).is_none() || marked(h)) {
+        for h in mesh.outgoing(v).filter(|&h| mesh.twin(h).is_none() || sharp[mesh.edge(h).index()]) {
             meet(mesh.vector(h));
         }
         if mesh.is_boundary_vertex(v) {

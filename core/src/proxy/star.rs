@@ -172,7 +172,7 @@ impl Tracked {
     }
 }
 
-/// A flat triangle in the order of its face, given that the face has `corner` (0 to 2) first of these.
+/// The triangle of a half-edge in the plane: its corners, given from the origin of the half-edge on, in face order.
 #[inline]
 pub(super) fn in_face_order(spoke: u32, corners: [DVec2; 3]) -> FlatFace {
     let mut ordered = [DVec2::ZERO; 3];

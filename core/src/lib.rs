@@ -11,6 +11,7 @@ pub mod layout;
 pub mod mesh;
 pub mod param;
 pub mod progress;
+pub mod proxy;
 pub mod quad;
 pub mod solve;
 pub mod strip;

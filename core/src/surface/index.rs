@@ -126,7 +126,7 @@ fn weigh(corners: &[DVec3; 3], weights: [f64; 3]) -> DVec3 {
 }
 
 /// The weights of the point of a triangle nearest to `p`, of any triangle however thin.
-fn nearest_in_triangle(p: DVec3, corners: &[DVec3; 3]) -> [f64; 3] {
+pub(crate) fn nearest_in_triangle(p: DVec3, corners: &[DVec3; 3]) -> [f64; 3] {
     let [a, b, c] = *corners;
     let normal = (b - a).cross(c - a);
     let area = normal.length_squared();

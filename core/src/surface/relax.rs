@@ -285,6 +285,6 @@ fn pass_vertices(
 }
 
 #[cfg(test)]
-pub(super) mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;

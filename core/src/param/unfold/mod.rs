@@ -39,7 +39,7 @@ const LARGE: usize = 2000;
 const AT_ONCE: usize = 25_000;
 /// Up to how many folds that one domain does not resolve are worth solving for large parts of the surface: where more
 /// remain, the map as a whole does not fit its constraints.
-const FEW: usize = 60;
+const FEW: usize = 24;
 /// The widest angle that corners at one vertex can have on average: 180° less what the bound on flatness takes.
 const WIDEST_CORNER: f64 = 175.0;
 

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Embeds layouts and prints a Markdown table row for each: the drawing beside the optimised embedding.
+#
+#   scripts/embed-table.sh SCRIPT|DESIGN|MESH...   a mesh is woven by suggestions first, until no region is orange
+#
+# Needs Python for reading the reports.
+set -u
+cd "$(dirname "$0")/.."
+cargo build --quiet -p plait || exit 1
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+echo "| layout | triangles | patches | steps | seconds | E | folds | E_confor | E_planar | E° | |"
+echo "|---|---|---|---|---|---|---|---|---|---|---|"
+for input in "$@"; do
+  name=$(basename "$input")
+  design=$input
+  case $input in
+  *.json | *.plait | *.layout) ;;
+  *)
+    design="$out/w/design.plait"
+    target/debug/plait weave "$input" --suggest --until orange --no-optimise --out "$out/w" >/dev/null 2>&1
+    ;;
+  esac
+  rm -rf "${out:?}/e"
+  message=$(timeout "${LIMIT:-600}" target/debug/plait embed "$design" --out "$out/e" --quiet 2>&1)
+  if [ -f "$out/e/report.json" ]; then
+    python3 - "$name" "$out/e/report.json" <<'PY'
+import json, sys
+name, path = sys.argv[1:]
+report = json.load(open(path))
+layout = report["layout"]
+e = layout["embedding"]
+seconds = report["seconds"].get("embed", 0)
+if e["optimised"]:
+    b = e["before"]
+    print(f"| {name} | {report['faces']} | {layout['patches']} | {e['steps']} | {seconds:.1f} "
+          f"| {e['energy_before']:.3f} → {e['energy_after']:.3f} "
+          f"| {e['flipped_before']} → {e['flipped_at_rest']} → {len(e['folds'])} "
+          f"| {b['conformal']:.2f} → {e['conformal']:.3f} | {b['planar']:.2f} → {e['planar']:.2f} "
+          f"| {b['alignment']:.1f} → {e['alignment']:.1f} | |")
+else:
+    print(f"| {name} | {report['faces']} | {layout['patches']} | | {seconds:.1f} | | | {e['conformal']:.2f} "
+          f"| {e['planar']:.2f} | {e['alignment']:.1f} | drawing kept: {e['problem']} |")
+PY
+  else
+    echo "| $name | | | | | | | | | | $(grep -v XDG <<<"$message" | head -n 1) |"
+  fi
+done

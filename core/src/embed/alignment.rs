@@ -16,7 +16,8 @@ use crate::param::Relation;
 /// Largest angle, in quarter turns, between a feature and the field along it: half of what would make it ambiguous.
 const SLANT: f64 = 0.25;
 
-/// All that is to be isolines, for the field of angles `angle`: what the layout demands, and features.
+/// All that is to be isolines, for the field of angles `angle`: what the layout demands, and features, those first that
+/// the field follows best.
 pub(super) fn relations(
     net: &Net,
     roads: &Crossroads,
@@ -77,7 +78,10 @@ fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<(H
             }
         }
     }
-    mesh.edges().filter_map(|e| found[e.index()].map(|(k, _)| (mesh.halfedge(e), k))).collect()
+    let mut list: Vec<(f64, HalfedgeId, i32)> =
+        mesh.edges().filter_map(|e| found[e.index()].map(|(k, off)| (off, mesh.halfedge(e), k))).collect();
+    list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    list.into_iter().map(|(_, h, k)| (h, k)).collect()
 }
 
 /// The heading along a side in its own triangle, from that of its edge's half-edge in that one's triangle.

@@ -360,7 +360,7 @@ impl<'a> Optimizer<'a> {
         for n in net.nodes.iter().filter(|n| !n.boundary) {
             quarters[n.vertex.index()] = n.valence as u32;
         }
-        let unfolded = system.unfold(&net.mesh, metric, field, objective, &quarters, &solution.free, progress)?;
+        let unfolded = system.unfold(&net.mesh, metric, field, objective, (&solution.free, &quarters), progress)?;
         tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
         solution.map = system.map(&unfolded.y);
         solution.energy = unfolded.energy;
@@ -478,25 +478,25 @@ impl Solver<'_> {
         field: &CrossField,
         nodes: &[VertexId],
     ) -> Result<&mut SeamlessSystem, EmbeddingError> {
-        let (demanded, features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
-        let mut wished = features;
-        wished.extend(self.spacing.relations(net, self.roads, self.least));
+        let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
+        let mut spacing = self.spacing.relations(net, self.roads, self.least);
         let mut system = self.seamless.take();
         loop {
-            let mut relations = demanded.clone();
-            relations.extend(wished.iter().cloned());
+            let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();
             let built = match &mut system {
                 Some(old) => old.rebuild(&net.mesh, field, nodes, &relations),
                 None => SeamlessSystem::new(&net.mesh, field, nodes, &relations).map(|new| system = Some(new)),
             };
             match (built, system) {
                 (Ok(()), Some(done)) => return Ok(self.seamless.insert(done)),
-                (Err(ParamError::Conflict { relation, .. }), kept) if !wished.is_empty() => {
+                (Err(ParamError::Conflict { relation, .. }), kept) if !(spacing.is_empty() && features.is_empty()) => {
                     tracing::debug!(relation, demanded = demanded.len(), "a wish contradicts the layout");
-                    match relation.checked_sub(demanded.len()) {
-                        Some(wish) if wish < wished.len() => drop(wished.remove(wish)),
-                        // Named is what was eliminated last, which need not be the wish that is to blame.
-                        _ => wished.truncate(wished.len() / 2),
+                    match relation.checked_sub(demanded.len() + spacing.len()) {
+                        Some(feature) => drop(features.remove(feature)),
+                        // Named is what was eliminated last, which need not be to blame: first those features give way
+                        // that the field follows least.
+                        None if !features.is_empty() => features.truncate(features.len() * 3 / 4),
+                        None => drop(spacing.pop()),
                     }
                     system = kept;
                 }
@@ -565,7 +565,7 @@ fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
     let off = (guide.angle - angle) / FRAC_PI_2;
     let off = (off - off.round()).abs();
     let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
-    (share > 0.0).then(|| field::Guide { weight: guide.weight * share, ..*guide })
+    (share > 0.0).then_some(field::Guide { weight: guide.weight * share, ..*guide })
 }
 
 /// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.

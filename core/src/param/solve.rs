@@ -258,8 +258,7 @@ impl SeamlessSystem {
         metric: &Metric,
         field: &CrossField,
         objective: &Objective,
-        quarters: &[u32],
-        y: &[f64],
+        (y, quarters): (&[f64], &[u32]),
         progress: &Progress,
     ) -> Result<Unfolded, ParamError> {
         expect_length("the list of angles around vertices", quarters.len(), mesh.n_vertices())?;

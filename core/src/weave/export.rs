@@ -10,7 +10,9 @@ use std::time::Instant;
 use super::embedding::{Drawn, draw};
 use super::report::{Before, Subject, Times, write_report};
 use super::session::{Session, WeaveError};
-use crate::embed::{self, Embedded, EmbeddingReport, Headings, Job, Next, Settings, Snapshot, Surface, headings};
+use crate::embed::{
+    self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings,
+};
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, write_obj};
 use crate::progress::Progress;
@@ -140,7 +142,10 @@ pub fn finish(
     let rough = (!layout.patches.is_empty()).then(|| map_patches(layout, drawing, progress));
     progress.check()?;
     let before = Before::new(drawing, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
+    let kept = optimised.as_ref().and_then(|o| o.as_ref().ok()).filter(|_| embedded.is_none());
+    let problem = kept.and_then(|e| no_better(&e.report, before.measures.as_ref()));
     let (layout, embedding, maps, optimised) = match (optimised, rough) {
+        (Some(Ok(_)), Some(Ok(maps))) if problem.is_some() => (layout.clone(), drawing.clone(), maps, problem.map(Err)),
         (Some(Ok(e)), _) => (e.layout, e.embedding, e.maps, Some(Ok(e.report))),
         (Some(Err(error)), None) => return Err(error.into()),
         (None, None) => return Err(WeaveError::Incomplete),
@@ -154,6 +159,20 @@ pub fn finish(
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
+}
+
+/// Why an optimised embedding is no better than the drawing, if so: layouts much coarser than the shape of the surface do
+/// not fit its principal directions, and their limbs are then squeezed.
+fn no_better(report: &EmbeddingReport, drawn: Option<&Measures>) -> Option<String> {
+    let (before, after) = (report.energy_before, report.energy_after);
+    if after >= before {
+        return Some(format!(
+            "the optimised map is no better than that of the drawing: energy {before:.3}, then {after:.3}"
+        ));
+    }
+    let (before, after) = (drawn?.conformal, report.measures.conformal);
+    (after >= before)
+        .then(|| format!("the optimised map distorts more than the drawing: {after:.2} instead of {before:.2}"))
 }
 
 /// The refinement of an embedded layout, on the surface.

@@ -4,24 +4,24 @@
 //! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
 //! another follows; if not, it is taken back and tried at half the length.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
 use super::cross::step_to_crossing;
 use super::gradient::descent;
-use super::guides::{feature_guides, shape_guides};
 use super::net::Net;
 use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
-use super::sizing::{SizingSystem, rest_turns};
+use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
+use super::solver::{Solver, State};
 use super::spacing::Spacing;
 use super::straight::{ArcEnd, Crossroads};
-use super::{EmbeddingError, alignment, voronoi};
-use crate::field::{self, CrossField, GuidedSystem, Metric};
+use super::{EmbeddingError, voronoi};
+use crate::field::{GuidedSystem, Metric};
 use crate::mesh::{TriMesh, VertexId};
-use crate::param::{Fold, Objective, ParamError, SeamlessSystem, Solution};
+use crate::param::{Fold, SeamlessSystem};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
@@ -30,16 +30,6 @@ use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
 /// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
 const STEP: f64 = 0.75 * 2.0 / 3.0;
 
-/// Deviation, in quarter turns, up to which a principal direction fully guides the field, and from which on not at all:
-/// beyond an eighth of a turn it would be another direction's.
-const AGREES: f64 = 0.15;
-const DISAGREES: f64 = 0.35;
-/// Pull of the rough drawing, in inverse squared lengths on a surface of bounding-box diagonal 1: it tells how the
-/// field as a whole is turned where nothing else does, and prevails in less than the whole surface nowhere.
-const DRAWN: f64 = 0.5;
-/// Rounds of guiding the first field, in each of which more directions come to agree.
-const FIRST_ROUNDS: usize = 4;
-
 /// Rounds of stiffening; by what a folded triangle's weight grows in each, and up to what; over how many rings of
 /// triangles that fades out, and by what factor in each.
 const STIFFENINGS: usize = 15;
@@ -47,8 +37,6 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
-/// How close irregular nodes may come to each other on the surface, in least lengths of arcs.
-const APART: f64 = 1.5;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
 const ALIKE: f64 = 0.3;
 /// By what a step is then lengthened, and how far at most.
@@ -90,21 +78,6 @@ impl Default for Settings {
     fn default() -> Self {
         Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true, spacing: 1.5 }
     }
-}
-
-/// Field and map for nodes at certain places.
-#[derive(Debug, Clone)]
-pub struct State {
-    /// The net: mesh, nodes, arcs.
-    pub net: Net,
-    /// The planar layouts of the mesh's triangles.
-    pub metric: Metric,
-    /// The guiding field.
-    pub field: CrossField,
-    /// What the map minimises.
-    pub objective: Objective,
-    /// The map and its energy.
-    pub solution: Solution,
 }
 
 /// An embedding under optimisation.
@@ -430,217 +403,6 @@ impl<'a> Optimizer<'a> {
     }
 }
 
-/// What field and map are solved with.
-struct Solver<'s> {
-    curvature: &'s [PrincipalCurvature],
-    sharp: &'s [bool],
-    roads: &'s Crossroads,
-    spacing: &'s Spacing,
-    least: f64,
-    guided: &'s GuidedSystem,
-    seamless: Option<SeamlessSystem>,
-    sizes: Option<SpdSymbolic>,
-    settings: Settings,
-}
-
-impl Solver<'_> {
-    fn solve(
-        &mut self,
-        net: Net,
-        metric: Metric,
-        previous: Option<&[f64]>,
-        progress: &Progress,
-    ) -> Result<State, EmbeddingError> {
-        let mesh = &net.mesh;
-        let angle = self.angles(&net, &metric, previous, progress)?;
-        let field = field::cross_field(mesh, &metric, &angle, &net.jump);
-        let lengths = if self.settings.sizing {
-            let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
-            self.sizes = Some(system.symbolic());
-            let rest = rest_turns(mesh, &metric, &angle, &net.jump);
-            system.lengths(mesh, &metric, &rest)?
-        } else {
-            Vec::new()
-        };
-        let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
-        let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
-        let system = self.build(&net, &metric, &field, &nodes)?;
-        progress.check()?;
-        let solution = system.solve(&metric, &field, &objective, progress)?;
-        Ok(State { net, metric, field, objective, solution })
-    }
-
-    /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
-    fn build(
-        &mut self,
-        net: &Net,
-        metric: &Metric,
-        field: &CrossField,
-        nodes: &[VertexId],
-    ) -> Result<&mut SeamlessSystem, EmbeddingError> {
-        let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
-        let mut spacing = self.spacing.relations(net, self.roads, self.least);
-        let mut system = self.seamless.take();
-        loop {
-            let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();
-            let built = match &mut system {
-                Some(old) => old.rebuild(&net.mesh, field, nodes, &relations),
-                None => SeamlessSystem::new(&net.mesh, field, nodes, &relations).map(|new| system = Some(new)),
-            };
-            match (built, system) {
-                (Ok(()), Some(done)) => return Ok(self.seamless.insert(done)),
-                (Err(ParamError::Conflict { relation, .. }), kept) if !(spacing.is_empty() && features.is_empty()) => {
-                    tracing::debug!(relation, demanded = demanded.len(), "a wish contradicts the layout");
-                    match relation.checked_sub(demanded.len() + spacing.len()) {
-                        Some(feature) => drop(features.remove(feature)),
-                        // Named is what was eliminated last, which need not be to blame: first those features give way
-                        // that the field follows least.
-                        None if !features.is_empty() => features.truncate(features.len() * 3 / 4),
-                        None => drop(spacing.pop()),
-                    }
-                    system = kept;
-                }
-                (Err(error), _) => return Err(error.into()),
-                (Ok(()), None) => system = None,
-            }
-        }
-    }
-
-    /// The angles of the guiding field; at first, without those of a field before, in several rounds.
-    fn angles(
-        &self,
-        net: &Net,
-        metric: &Metric,
-        previous: Option<&[f64]>,
-        progress: &Progress,
-    ) -> Result<Vec<f64>, EmbeddingError> {
-        let mesh = &net.mesh;
-        let held = self.held_directions(net, metric);
-        let shape = shape_guides(mesh, metric, self.curvature, self.sharp);
-        let (mut angle, rounds) = match previous {
-            Some(angle) => (angle.to_vec(), 1),
-            None => (net.angle.clone(), FIRST_ROUNDS),
-        };
-        for round in 0..rounds {
-            // At first features draw the field towards them; those that it still contradicts do not bend it.
-            let convinced = previous.is_some() || round >= FIRST_ROUNDS / 2;
-            let keep = |g: &field::Guide| match g.branch {
-                None if convinced => agreeing(g, angle[g.face.index()]),
-                _ => Some(*g),
-            };
-            let mut guides: Vec<field::Guide> = held.iter().filter_map(keep).collect();
-            guides.extend(shape.iter().filter_map(|g| agreeing(g, angle[g.face.index()])));
-            angle = self.guided.solve(mesh, metric, &net.jump, &guides, Some(&angle), progress)?.angle;
-        }
-        Ok(angle)
-    }
-
-    /// Directions that hold whatever the field: those of features, of which it is open which direction of a cross
-    /// follows them, those of the boundary, of which the layout tells, and weakly those of the drawing.
-    fn held_directions(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
-        let mesh = &net.mesh;
-        let mut guides = feature_guides(mesh, metric, self.sharp);
-        guides.extend(mesh.faces().map(|face| field::Guide {
-            face,
-            angle: net.angle[face.index()],
-            weight: DRAWN * metric.area(face),
-            branch: Some(0),
-        }));
-        for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
-            if let Some(&(k, _)) = net.boundary.get(&h) {
-                let (face, angle) = (mesh.face(h), metric.direction(h));
-                guides.push(field::Guide { face, angle, weight: field::RELIABLE, branch: Some(i32::from(k)) });
-            }
-        }
-        guides
-    }
-}
-
-/// A guide as strong as it agrees with the field at hand; `None` where it does not.
-///
-/// The layout's structure prevails over principal directions: where both contradict each other, or a direction is
-/// wrongly taken for its neighbour a quarter turn away, the field would turn by a quarter within a few triangles and
-/// tear the map.
-fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
-    let off = (guide.angle - angle) / FRAC_PI_2;
-    let off = (off - off.round()).abs();
-    let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
-    (share > 0.0).then_some(field::Guide { weight: guide.weight * share, ..*guide })
-}
-
-/// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.
-fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<bool> {
-    let n = surface.mesh.n_vertices();
-    let pair = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
-    let sharp: std::collections::BTreeSet<_> = surface
-        .mesh
-        .edges()
-        .filter(|e| surface.sharp[e.index()])
-        .map(|e| surface.mesh.edge_vertices(e))
-        .map(|[a, b]| pair(a, b))
-        .collect();
-    net.mesh
-        .edges()
-        .map(|e| {
-            let [a, b] = net.mesh.edge_vertices(e);
-            if a.index() < n && b.index() < n {
-                return sharp.contains(&pair(a, b));
-            }
-            // A half of a sharp edge: on it lies the inserted vertex, between the two ends.
-            let (new, old) = if a.index() >= n { (a, b) } else { (b, a) };
-            let p = net.mesh.position(new);
-            let q = net.mesh.position(old);
-            net.mesh.outgoing(new).map(|h| net.mesh.target(h)).any(|w| {
-                let r = net.mesh.position(w);
-                let flat = (q - p).cross(r - p).length() < 1e-9 * q.distance(r).powi(2) && (q - p).dot(r - p) < 0.0;
-                w.index() < n && old.index() < n && flat && sharp.contains(&pair(old, w))
-            })
-        })
-        .collect()
-}
-
-fn ground<'a>(
-    surface: &Surface<'a>,
-    net: &Net,
-    sharp: &[bool],
-    pinned: impl Fn(usize) -> bool,
-    settings: Settings,
-) -> Ground<'a> {
-    let mesh = &net.mesh;
-    let curve: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] || mesh.is_boundary_edge(e)).collect();
-    let mut degree = vec![0; mesh.n_vertices()];
-    for e in mesh.edges().filter(|e| curve[e.index()]) {
-        for v in mesh.edge_vertices(e) {
-            degree[v.index()] += 1;
-        }
-    }
-    let hold = net
-        .nodes
-        .iter()
-        .enumerate()
-        .map(|(i, n)| match degree[n.vertex.index()] {
-            _ if pinned(i) => Hold::Fixed,
-            0 => Hold::Free,
-            2 if !turns(mesh, &curve, n.vertex) => Hold::Curve,
-            _ => Hold::Fixed,
-        })
-        .collect();
-    let on_curve = degree.iter().map(|&d| d > 0).collect();
-    Ground {
-        surface: surface.mesh,
-        index: surface.index,
-        home: mesh.positions().to_vec(),
-        curve,
-        on_curve,
-        hold,
-        apart: APART * settings.spacing * mean_edge(mesh),
-    }
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64
-}
-
 /// Raises the weights of folded triangles, less in the rings around them.
 fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
     let mut share: Vec<f64> = folded.iter().map(|&f| if f { 1.0 } else { 0.0 }).collect();
@@ -655,19 +417,4 @@ fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
     for (w, s) in weight.iter_mut().zip(share) {
         *w = (*w * (1.0 + STIFFER * s)).min(STIFFEST);
     }
-}
-
-/// Cosine below which a curve has a corner: half way to a right angle.
-const CORNER: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// Whether the two curve edges at `v` meet in a corner.
-fn turns(mesh: &TriMesh, curve: &[bool], v: VertexId) -> bool {
-    let ends: Vec<DVec3> = mesh
-        .outgoing(v)
-        .flat_map(|h| [h, mesh.prev(h)])
-        .filter(|&h| curve[mesh.edge(h).index()])
-        .map(|h| if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) })
-        .map(|w| (mesh.position(w) - mesh.position(v)).normalize_or_zero())
-        .collect();
-    ends.iter().any(|a| ends.iter().all(|b| a == b || -a.dot(*b) < CORNER))
 }

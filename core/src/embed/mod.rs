@@ -21,9 +21,11 @@ mod patches;
 mod pipeline;
 mod relocate;
 mod rose;
+mod setup;
 mod shift;
 mod sizing;
 mod snap;
+mod solver;
 mod spacing;
 mod straight;
 mod trace;
@@ -37,7 +39,7 @@ mod samples;
 mod tests;
 
 pub use bending::face_curvature;
-pub use descent::{Optimizer, Settings, State, Surface};
+pub use descent::{Optimizer, Settings, Surface};
 pub use emerge::{EmergeError, Emerged, emerge};
 pub use guides::{feature_guides, shape_guides};
 pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
@@ -46,6 +48,7 @@ pub use patches::{RectangleError, map_rectangles};
 pub use pipeline::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Snapshot, optimise};
 pub use relocate::Hold;
 pub use sizing::{SizingSystem, rest_turns};
+pub use solver::State;
 pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
 
 use thiserror::Error;

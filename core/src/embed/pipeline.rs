@@ -3,9 +3,10 @@
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
-use super::descent::{Optimizer, Settings, State, Surface};
+use super::descent::{Optimizer, Settings, Surface};
 use super::measures::{Measures, measure_patches};
 use super::net::Headings;
+use super::solver::State;
 use super::trace::{ArcChain, Folds, preview_arcs, trace_arcs};
 use super::{EmbeddingError, emerge, map_rectangles};
 use crate::layout::{Embedding, PatchMap, QuadLayout};

@@ -131,3 +131,94 @@ fn cancel(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
     }
     *crossed = kept;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::lift::vertex_index;
+    use super::super::{Net, headings};
+    use crate::dual::Arrangement;
+    use crate::field::Metric;
+    use crate::layout::{QuadLayout, embed};
+    use crate::mesh::{HalfedgeId, TriMesh};
+    use crate::progress::Progress;
+    use crate::testing::{column, row, torus};
+
+    /// A layout of two by two patches on a torus, whose first node is given the index of a node of valence 3 and whose
+    /// second that of one of valence 5: as for moving them, nothing else need be true of it.
+    fn net() -> Net {
+        let mesh = torus(24, 12);
+        let mut curves = vec![row(24, 1, true, 0.4), row(24, 7, true, 0.4)];
+        curves.extend([3, 14].map(|i| column(24, 12, i, true, 0.6)));
+        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
+        let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
+        let drawing = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+        let mut net = Net::new(&mesh, &drawing, &layout, &headings(&layout)).unwrap();
+        for (node, valence) in [(0, 3), (1, 5)] {
+            net.nodes[node].valence = valence;
+            let h = net.mesh.outgoing(net.nodes[node].vertex).next().unwrap();
+            let turns = if net.mesh.halfedge(net.mesh.edge(h)) == h { 1 } else { -1 };
+            net.jump[net.mesh.edge(h).index()] += turns * net.nodes[node].index();
+        }
+        net
+    }
+
+    fn indices(mesh: &TriMesh, jump: &[i32]) -> Vec<i32> {
+        let metric = Metric::new(mesh);
+        mesh.vertices().map(|v| vertex_index(mesh, &metric, jump, v)).collect()
+    }
+
+    fn is_chain(net: &Net, arc: usize) -> bool {
+        let a = &net.arcs[arc];
+        let mut face = net.mesh.face(a.start);
+        let joined = a.crossed.iter().all(|&h| {
+            let here = net.mesh.face(h) == face;
+            face = net.mesh.face(net.mesh.twin(h).unwrap());
+            here
+        });
+        let ends = [a.start, a.end].map(|h| net.mesh.origin(h));
+        joined && face == net.mesh.face(a.end) && ends == a.nodes.map(|n| net.nodes[n as usize].vertex)
+    }
+
+    #[test]
+    fn a_node_takes_its_index_and_its_arcs_along() {
+        let mut net = net();
+        let before = indices(&net.mesh, &net.jump);
+        for step in 0..40usize {
+            let node = 0;
+            let v = net.nodes[node].vertex;
+            let spokes: Vec<HalfedgeId> = net.mesh.outgoing(v).collect();
+            let h = spokes[(step * 7 + step / 3) % spokes.len()];
+            let w = net.mesh.target(h);
+            if net.nodes.iter().any(|n| n.vertex == w) {
+                continue;
+            }
+            let old = indices(&net.mesh, &net.jump);
+            net.move_along(node, h);
+            let new = indices(&net.mesh, &net.jump);
+            assert_eq!(new[w.index()], old[w.index()] + 1);
+            assert_eq!(new[v.index()], old[v.index()] - 1);
+            assert_eq!(new.iter().sum::<i32>(), before.iter().sum::<i32>());
+            assert!((0..net.arcs.len()).all(|a| is_chain(&net, a)));
+        }
+    }
+
+    #[test]
+    fn there_and_back_changes_nothing() {
+        let mut net = net();
+        let before = net.clone();
+        let h = net.mesh.outgoing(net.nodes[0].vertex).nth(2).unwrap();
+        net.move_along(0, h);
+        net.move_along(0, net.mesh.twin(h).unwrap());
+        assert_eq!((&net.jump, &net.nodes), (&before.jump, &before.nodes));
+        for (a, b) in net.arcs.iter().zip(&before.arcs) {
+            // A chain may start in another triangle of the node; what it says of the end is the same.
+            let end = |net: &crate::embed::Net, arc: &crate::embed::NetArc| {
+                let turns: i32 = arc.crossed.iter().map(|&h| net.jump_across(h)).sum();
+                (i32::from(arc.heading) - turns).rem_euclid(4)
+            };
+            if net.mesh.face(a.end) == before.mesh.face(b.end) {
+                assert_eq!(end(&net, a), end(&before, b));
+            }
+        }
+    }
+}

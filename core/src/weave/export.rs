@@ -161,11 +161,14 @@ pub fn finish(
     Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
 }
 
+/// From what factor on a figure has become worse: removing folds may cost a little.
+const WORSE: f64 = 1.05;
+
 /// Why an optimised embedding is no better than the drawing, if so: layouts much coarser than the shape of the surface do
 /// not fit its principal directions, and their limbs are then squeezed.
 fn no_better(report: &EmbeddingReport, drawn: Option<&Measures>) -> Option<String> {
     let (before, after) = (report.energy_before, report.energy_after);
-    if after >= before {
+    if after > WORSE * before {
         return Some(format!(
             "the optimised map is no better than that of the drawing: energy {before:.3}, then {after:.3}"
         ));

@@ -1,0 +1,181 @@
+//! Field and map of a net whose nodes stay where they are: linear solves (Campen, sections 6.3 and 6.4).
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::descent::Settings;
+use super::guides::{feature_guides, shape_guides};
+use super::net::Net;
+use super::sizing::{SizingSystem, rest_turns};
+use super::spacing::Spacing;
+use super::straight::Crossroads;
+use super::{EmbeddingError, alignment};
+use crate::field::{self, CrossField, GuidedSystem, Metric};
+use crate::mesh::VertexId;
+use crate::param::{Objective, ParamError, SeamlessSystem, Solution};
+use crate::progress::Progress;
+use crate::solve::SpdSymbolic;
+use crate::surface::PrincipalCurvature;
+
+/// Deviation, in quarter turns, up to which a principal direction fully guides the field, and from which on not at all:
+/// beyond an eighth of a turn it would be another direction's.
+const AGREES: f64 = 0.15;
+const DISAGREES: f64 = 0.35;
+/// Pull of the rough drawing, in inverse squared lengths on a surface of bounding-box diagonal 1: it tells how the
+/// field as a whole is turned where nothing else does, and prevails in less than the whole surface nowhere.
+const DRAWN: f64 = 0.5;
+/// Rounds of guiding the first field, in each of which more directions come to agree.
+const FIRST_ROUNDS: usize = 4;
+
+/// Field and map for nodes at certain places.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The net: mesh, nodes, arcs.
+    pub net: Net,
+    /// The planar layouts of the mesh's triangles.
+    pub metric: Metric,
+    /// The guiding field.
+    pub field: CrossField,
+    /// What the map minimises.
+    pub objective: Objective,
+    /// The map and its energy.
+    pub solution: Solution,
+}
+
+/// What field and map are solved with.
+pub(super) struct Solver<'s> {
+    pub curvature: &'s [PrincipalCurvature],
+    pub sharp: &'s [bool],
+    pub roads: &'s Crossroads,
+    pub spacing: &'s Spacing,
+    pub least: f64,
+    pub guided: &'s GuidedSystem,
+    pub seamless: Option<SeamlessSystem>,
+    pub sizes: Option<SpdSymbolic>,
+    pub settings: Settings,
+}
+
+impl Solver<'_> {
+    /// Solves for field and map of a net; with the angles of a field before, guides follow those.
+    pub(super) fn solve(
+        &mut self,
+        net: Net,
+        metric: Metric,
+        previous: Option<&[f64]>,
+        progress: &Progress,
+    ) -> Result<State, EmbeddingError> {
+        let mesh = &net.mesh;
+        let angle = self.angles(&net, &metric, previous, progress)?;
+        let field = field::cross_field(mesh, &metric, &angle, &net.jump);
+        let lengths = if self.settings.sizing {
+            let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
+            self.sizes = Some(system.symbolic());
+            let rest = rest_turns(mesh, &metric, &angle, &net.jump);
+            system.lengths(mesh, &metric, &rest)?
+        } else {
+            Vec::new()
+        };
+        let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
+        let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
+        let system = self.build(&net, &metric, &field, &nodes)?;
+        progress.check()?;
+        let solution = system.solve(&metric, &field, &objective, progress)?;
+        Ok(State { net, metric, field, objective, solution })
+    }
+
+    /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
+    fn build(
+        &mut self,
+        net: &Net,
+        metric: &Metric,
+        field: &CrossField,
+        nodes: &[VertexId],
+    ) -> Result<&mut SeamlessSystem, EmbeddingError> {
+        let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
+        let mut spacing = self.spacing.relations(net, self.roads, self.least);
+        let mut system = self.seamless.take();
+        loop {
+            let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();
+            let built = match &mut system {
+                Some(old) => old.rebuild(&net.mesh, field, nodes, &relations),
+                None => SeamlessSystem::new(&net.mesh, field, nodes, &relations).map(|new| system = Some(new)),
+            };
+            match (built, system) {
+                (Ok(()), Some(done)) => return Ok(self.seamless.insert(done)),
+                (Err(ParamError::Conflict { relation, .. }), kept) if !(spacing.is_empty() && features.is_empty()) => {
+                    tracing::debug!(relation, demanded = demanded.len(), "a wish contradicts the layout");
+                    match relation.checked_sub(demanded.len() + spacing.len()) {
+                        Some(feature) => drop(features.remove(feature)),
+                        // Named is what was eliminated last, which need not be to blame: first those features give way
+                        // that the field follows least.
+                        None if !features.is_empty() => features.truncate(features.len() * 3 / 4),
+                        None => drop(spacing.pop()),
+                    }
+                    system = kept;
+                }
+                (Err(error), _) => return Err(error.into()),
+                (Ok(()), None) => system = None,
+            }
+        }
+    }
+
+    /// The angles of the guiding field; at first, without those of a field before, in several rounds.
+    fn angles(
+        &self,
+        net: &Net,
+        metric: &Metric,
+        previous: Option<&[f64]>,
+        progress: &Progress,
+    ) -> Result<Vec<f64>, EmbeddingError> {
+        let mesh = &net.mesh;
+        let held = self.held_directions(net, metric);
+        let shape = shape_guides(mesh, metric, self.curvature, self.sharp);
+        let (mut angle, rounds) = match previous {
+            Some(angle) => (angle.to_vec(), 1),
+            None => (net.angle.clone(), FIRST_ROUNDS),
+        };
+        for round in 0..rounds {
+            // At first features draw the field towards them; those that it still contradicts do not bend it.
+            let convinced = previous.is_some() || round >= FIRST_ROUNDS / 2;
+            let keep = |g: &field::Guide| match g.branch {
+                None if convinced => agreeing(g, angle[g.face.index()]),
+                _ => Some(*g),
+            };
+            let mut guides: Vec<field::Guide> = held.iter().filter_map(keep).collect();
+            guides.extend(shape.iter().filter_map(|g| agreeing(g, angle[g.face.index()])));
+            angle = self.guided.solve(mesh, metric, &net.jump, &guides, Some(&angle), progress)?.angle;
+        }
+        Ok(angle)
+    }
+
+    /// Directions that hold whatever the field: those of features, of which it is open which direction of a cross
+    /// follows them, those of the boundary, of which the layout tells, and weakly those of the drawing.
+    fn held_directions(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
+        let mesh = &net.mesh;
+        let mut guides = feature_guides(mesh, metric, self.sharp);
+        guides.extend(mesh.faces().map(|face| field::Guide {
+            face,
+            angle: net.angle[face.index()],
+            weight: DRAWN * metric.area(face),
+            branch: Some(0),
+        }));
+        for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
+            if let Some(&(k, _)) = net.boundary.get(&h) {
+                let (face, angle) = (mesh.face(h), metric.direction(h));
+                guides.push(field::Guide { face, angle, weight: field::RELIABLE, branch: Some(i32::from(k)) });
+            }
+        }
+        guides
+    }
+}
+
+/// A guide as strong as it agrees with the field at hand; `None` where it does not.
+///
+/// The layout's structure prevails over principal directions: where both contradict each other, or a direction is
+/// wrongly taken for its neighbour a quarter turn away, the field would turn by a quarter within a few triangles and
+/// tear the map.
+fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
+    let off = (guide.angle - angle) / FRAC_PI_2;
+    let off = (off - off.round()).abs();
+    let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
+    (share > 0.0).then_some(field::Guide { weight: guide.weight * share, ..*guide })
+}

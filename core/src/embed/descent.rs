@@ -114,7 +114,12 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
         let Job { surface, layout, settings, .. } = *job;
-        let pinned = |i: usize| job.pinned_nodes.get(i).copied().unwrap_or(false);
+        let mut held = job.pinned_nodes.to_vec();
+        held.resize(layout.nodes.len(), false);
+        for (arc, _) in layout.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {
+            arc.nodes.iter().for_each(|&n| held[n as usize] = true);
+        }
+        let pinned = |i: usize| held[i];
         let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);

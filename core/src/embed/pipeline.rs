@@ -31,7 +31,7 @@ pub struct Job<'a> {
     pub headings: &'a [Headings],
     /// Nodes that are to stay where the drawing has them; empty: none.
     pub pinned_nodes: &'a [bool],
-    /// Arcs that are to stay as they are drawn; empty: none.
+    /// Arcs whose ends are to stay where the drawing has them; empty: none. Between its ends an arc is an isoline.
     pub pinned_arcs: &'a [bool],
     /// How to go about it.
     pub settings: Settings,

@@ -11,7 +11,7 @@ use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfaceIndex;
-use plait_core::weave::{self, Drawn, Pin, PinnedParts, Session, WeaveError};
+use plait_core::weave::{self, Drawn, PinnedParts, Session, WeaveError};
 
 use crate::engine::{
     EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColor, Remark,
@@ -113,14 +113,6 @@ pub fn with_pins(preview: &LayoutPreview, pinned: &PinnedParts) -> LayoutPreview
         arc.pinned = pinned;
     }
     preview
-}
-
-/// The pins that stand for parts of a layout.
-pub fn pins(drawn: &Drawn, parts: &PinnedParts) -> Vec<Pin> {
-    let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
-    let nodes = set(&parts.nodes).into_iter().filter_map(|i| drawn.node_pin(i));
-    let arcs = set(&parts.arcs).into_iter().filter_map(|i| drawn.arc_pin(i));
-    nodes.chain(arcs).collect()
 }
 
 /// Optimises the embedding, from that of last time on where there is one.

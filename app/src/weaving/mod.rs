@@ -235,7 +235,7 @@ impl Engine for SessionEngine {
             LayoutPart::Arc(i) => parts.arcs.get_mut(i),
         };
         *place.ok_or_else(|| EngineError::failed("the layout has no such part"))? = pinned;
-        let pins = embedding::pins(&shown.drawn, &parts);
+        let pins = shown.drawn.pins(&parts);
         self.session.set_pins(pins);
         self.refresh();
         Ok(())

@@ -319,6 +319,7 @@ impl<'a> Optimizer<'a> {
             let net = self.settled();
             self.state = self.solve(net, progress)?;
         }
+        self.refine(progress)?;
         self.roads.hold_all();
         loop {
             self.state = self.solve(self.state.net.clone(), progress)?;
@@ -344,6 +345,18 @@ impl<'a> Optimizer<'a> {
         solution.energy = unfolded.energy;
         solution.free = unfolded.y;
         Ok((self.state, unfolded.folds))
+    }
+
+    /// Makes the triangles around irregular nodes finer.
+    fn refine(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        let State { net, field, .. } = &self.state;
+        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else { return Ok(()) };
+        self.guided = GuidedSystem::new(&net.mesh)?;
+        (self.seamless, self.sizes) = (None, None);
+        (self.sharp, self.curvature) = (carried.sharp, carried.at_vertex);
+        self.state.field.angle = net.angle.clone();
+        self.state = self.solve(net, progress)?;
+        Ok(())
     }
 
     /// Makes triangles at folds count more, and again, until none is left or it helps no more (Bommes, Zimmer and Kobbelt,

@@ -19,6 +19,7 @@ mod measures;
 mod net;
 mod patches;
 mod pipeline;
+mod refine;
 mod relocate;
 mod rose;
 mod setup;

@@ -153,6 +153,7 @@ impl<'a> Optimizer<'a> {
             seamless: None,
             sizes: None,
             settings,
+            features: true,
         };
         let state = solver.solve(net, metric, None, progress)?;
         let (seamless, sizes) = (solver.seamless, solver.sizes);
@@ -397,6 +398,7 @@ impl<'a> Optimizer<'a> {
             seamless: self.seamless.take(),
             sizes: self.sizes.take(),
             settings: self.settings,
+            features: true,
         };
         let next = solver.solve(net, metric, Some(&self.state.field.angle), progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);

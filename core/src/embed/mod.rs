@@ -13,6 +13,7 @@ mod descent;
 mod emerge;
 mod gradient;
 mod guides;
+mod injective;
 mod lift;
 mod march;
 mod measures;
@@ -55,6 +56,7 @@ pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
 use thiserror::Error;
 
 use crate::field::FieldError;
+use crate::layout::PatchError;
 use crate::mesh::{EdgeId, TriMeshError, VertexId};
 use crate::param::ParamError;
 use crate::progress::Cancelled;
@@ -101,6 +103,9 @@ pub enum EmbeddingError {
     /// The patches are not the rectangles the layout says.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
+    /// The patches of the drawing could not be mapped.
+    #[error(transparent)]
+    Patch(#[from] PatchError),
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

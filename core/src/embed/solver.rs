@@ -52,6 +52,8 @@ pub(super) struct Solver<'s> {
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
     pub settings: Settings,
+    /// Whether features are to be isolines exactly.
+    pub features: bool,
 }
 
 impl Solver<'_> {
@@ -91,6 +93,9 @@ impl Solver<'_> {
         nodes: &[VertexId],
     ) -> Result<&mut SeamlessSystem, EmbeddingError> {
         let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
+        if !self.features {
+            features.clear();
+        }
         let mut spacing = self.spacing.relations(net, self.roads, self.least);
         let mut system = self.seamless.take();
         loop {

@@ -11,7 +11,7 @@ use glam::DVec2;
 use super::assembly::Scatter;
 use super::constraints;
 use super::cut::Cut;
-use super::objective::{Objective, residuals};
+use super::objective::{Local, Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
 use super::unfold::{OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
@@ -192,10 +192,15 @@ impl SeamlessSystem {
         if let Some(e) = (0..self.jump.len()).find(|&e| self.jump[e] != field.jump[e].rem_euclid(4) as u8) {
             return Err(ParamError::OtherJump { edge: EdgeId::new(e) });
         }
+        Ok(self.assemble_with(|f| objective.local(metric, field.angle[f.index()], f)))
+    }
+
+    /// The matrix and the right-hand side of what each triangle contributes.
+    pub(super) fn assemble_with(&self, local: impl Fn(FaceId) -> Local) -> (SparseHermitian<f64>, Vec<f64>) {
         let mut open = self.shares.zero.clone();
         let mut load = vec![0.0; self.seams.n_free()];
-        for f in 0..n_faces {
-            let local = objective.local(metric, field.angle[f], FaceId::new(f));
+        for f in 0..self.cut.turn.len() {
+            let local = local(FaceId::new(f));
             self.shares.add(f, local.stiffness.as_flattened(), &mut open);
             for (axis, shares) in (0..).zip(local.load) {
                 for (i, share) in shares.into_iter().enumerate() {
@@ -206,7 +211,17 @@ impl SeamlessSystem {
                 }
             }
         }
-        Ok(self.tied.fold(&open, load))
+        self.tied.fold(&open, load)
+    }
+
+    /// What the seams leave of all variables.
+    pub(super) fn seams(&self) -> &Reduction {
+        &self.seams
+    }
+
+    /// What the relations leave of what the seams leave.
+    pub(super) fn ties(&self) -> &Reduction {
+        &self.tied.ties
     }
 
     /// Factors a matrix of this system; the first time its pattern is analysed.

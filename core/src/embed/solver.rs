@@ -47,7 +47,6 @@ pub(super) struct Solver<'s> {
     pub sharp: &'s [bool],
     pub roads: &'s Crossroads,
     pub spacing: &'s Spacing,
-    pub least: f64,
     pub guided: &'s GuidedSystem,
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
@@ -91,7 +90,7 @@ impl Solver<'_> {
         nodes: &[VertexId],
     ) -> Result<&mut SeamlessSystem, EmbeddingError> {
         let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
-        let mut spacing = self.spacing.relations(net, self.roads, self.least);
+        let mut spacing = self.spacing.relations(net, self.roads);
         let mut system = self.seamless.take();
         loop {
             let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();

@@ -8,9 +8,9 @@ use std::time::Instant;
 use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
-use plait_core::weave::{Export, ExportOptions, OpenedLayout, Session, Times, draw, write_all};
+use plait_core::weave::{Export, OpenedLayout, Session, Times, draw, write_all};
 
-use super::weave::{explain, open, quad_size, say};
+use super::weave::{explain, export_options, open, say};
 use super::{EmbedArguments, has_extension};
 
 /// Embeds and writes into the folder.
@@ -19,7 +19,7 @@ use super::{EmbedArguments, has_extension};
 ///
 /// When the input cannot be read, the layout is not valid or could not be embedded, or a file cannot be written.
 pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
-    let options = ExportOptions { size: quad_size(arguments.size)?, embedding: Some(settings(arguments)?) };
+    let options = export_options(arguments.size, arguments.refine, Some(settings(arguments)?))?;
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
     let progress = &*interrupt.progress;
@@ -87,6 +87,9 @@ pub(super) fn summary(export: &Export) -> String {
     if let Some(Ok(report)) = &export.optimised {
         let (before, after) = (report.energy_before, report.energy_after);
         text += &format!(", energy {before:.4} to {after:.4} in {} steps", report.steps);
+        if !report.collapsed.is_empty() {
+            text += &format!(", {} chords collapsed", report.collapsed.len());
+        }
     }
     let m = export.measures();
     text += &format!(

@@ -69,8 +69,11 @@ pub struct WeaveArguments {
     /// How fine the quads are.
     #[command(flatten)]
     pub size: SizeArguments,
+    /// What may change for the sake of the quads.
+    #[command(flatten)]
+    pub refine: RefineArguments,
     /// Write the layout as it is first drawn, without optimising its embedding.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["integer", "collapse"])]
     pub no_optimise: bool,
 }
 
@@ -85,6 +88,18 @@ pub struct SizeArguments {
     pub quads: Option<usize>,
 }
 
+/// What of the layout may change for the sake of the quads.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct RefineArguments {
+    /// Make patches as wide and high as multiples of a quad's edge, so that quads are squares of one size in the map.
+    #[arg(long)]
+    pub integer: bool,
+    /// Collapse arcs that want to be shorter than this, in the mesh's units, with all their dual strip; without a
+    /// length, shorter than a quad's edge.
+    #[arg(long, value_name = "LENGTH", num_args = 0..=1)]
+    pub collapse: Option<Option<f64>>,
+}
+
 /// Arguments of `plait embed`.
 #[derive(Debug, clap::Args)]
 pub struct EmbedArguments {
@@ -96,6 +111,9 @@ pub struct EmbedArguments {
     /// How fine the quads are.
     #[command(flatten)]
     pub size: SizeArguments,
+    /// What may change for the sake of the quads.
+    #[command(flatten)]
+    pub refine: RefineArguments,
     /// Most steps of the nodes.
     #[arg(long)]
     pub steps: Option<usize>,

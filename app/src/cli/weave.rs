@@ -6,14 +6,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context as _;
-use plait_core::embed::{Next, Snapshot};
+use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, WeaveError, replay, write_all,
+    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay, write_all,
 };
 
 use super::embed::summary;
-use super::{SizeArguments, Until, WeaveArguments, has_extension};
+use super::{RefineArguments, SizeArguments, Until, WeaveArguments, has_extension};
 
 /// Weaves and writes into the folder.
 ///
@@ -37,7 +37,7 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     let woven = start.elapsed().as_secs_f64();
     let seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
     let embedding = ExportOptions::default().embedding.filter(|_| !arguments.no_optimise);
-    let options = ExportOptions { size: quad_size(arguments.size)?, embedding };
+    let options = export_options(arguments.size, arguments.refine, embedding)?;
     let mut watch = |_: &Snapshot| Next::Continue;
     let export = write_all(&session, None, &options, &arguments.out, seconds, &progress, &mut watch)?
         .map_err(|error| explain(&session, error))?;
@@ -54,8 +54,23 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What is to be written.
+pub(super) fn export_options(
+    size: SizeArguments,
+    refine: RefineArguments,
+    embedding: Option<Settings>,
+) -> anyhow::Result<ExportOptions> {
+    let collapse = match refine.collapse {
+        None => None,
+        Some(None) => Some(Shortest::Quad),
+        Some(Some(length)) if length.is_finite() && length > 0.0 => Some(Shortest::Length(length)),
+        Some(Some(length)) => anyhow::bail!("the length to collapse must be positive, not {length}"),
+    };
+    Ok(ExportOptions { size: quad_size(size)?, embedding, integer: refine.integer, collapse })
+}
+
 /// How fine the quads are to be.
-pub(super) fn quad_size(arguments: SizeArguments) -> anyhow::Result<QuadSize> {
+fn quad_size(arguments: SizeArguments) -> anyhow::Result<QuadSize> {
     Ok(match (arguments.edge_length, arguments.quads) {
         (Some(length), _) if length.is_finite() && length > 0.0 => QuadSize::EdgeLength(length),
         (Some(length), _) => anyhow::bail!("the edge length must be positive, not {length}"),

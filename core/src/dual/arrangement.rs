@@ -169,11 +169,17 @@ impl Arrangement {
         base: &TriMesh,
         curves: impl IntoIterator<Item = &'c SurfaceCurve>,
     ) -> Result<Self, ArrangementError> {
-        let this = Self::sketch(base, curves)?;
-        match this.with_inner_vertices() {
-            Some(refined) => Self::read(refined, base.n_vertices()),
-            None => Ok(this),
-        }
+        Self::sketch(base, curves)?.complete()
+    }
+
+    /// The arrangement of curves that are drawn already, as marked edges of a mesh that has all vertices of the surface
+    /// before others.
+    ///
+    /// # Errors
+    ///
+    /// When the marked edges are not those of curves that cross transversally.
+    pub(crate) fn of_drawn(refined: RefinedMesh, n_base_vertices: usize) -> Result<Self, ArrangementError> {
+        Self::read(refined, n_base_vertices)?.complete()
     }
 
     /// As [`Self::new`], but a segment or stretch may be a single edge: enough to assess, not to embed.
@@ -191,6 +197,13 @@ impl Arrangement {
             inserter.insert(curve, i as u32).map_err(|source| ArrangementError::Draw { curve: i, source })?;
         }
         Self::read(inserter.refined, base.n_vertices())
+    }
+
+    fn complete(self) -> Result<Self, ArrangementError> {
+        match self.with_inner_vertices() {
+            Some(refined) => Self::read(refined, self.n_base_vertices),
+            None => Ok(self),
+        }
     }
 
     /// The refined mesh with the segments and boundary stretches split that are single edges, if there are

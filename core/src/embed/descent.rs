@@ -16,7 +16,7 @@ use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
 use super::solver::{Solver, State};
-use super::spacing::Spacing;
+use super::spacing::{Spacing, lengths};
 use super::straight::{ArcEnd, Crossroads};
 use super::{EmbeddingError, voronoi};
 use crate::field::{GuidedSystem, Metric};
@@ -71,32 +71,37 @@ pub struct Settings {
     pub sizing: bool,
     /// Least length of an arc in the map, in mean edges of the mesh.
     pub spacing: f64,
+    /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
+    pub collapse: Option<f64>,
+    /// The edge length that all chords are to be multiples of in the end, likewise; `None`: lengths are free.
+    pub integer: Option<f64>,
 }
 
 impl Default for Settings {
     /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
     fn default() -> Self {
-        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true, spacing: 1.5 }
+        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true, spacing: 1.5, collapse: None, integer: None }
     }
 }
 
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
-    ground: Ground<'a>,
+    pub(super) ground: Ground<'a>,
     settings: Settings,
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
-    roads: Crossroads,
-    /// Chords held at the least length, the chord of every arc, and that length.
-    spacing: Spacing,
-    chord_of: Vec<u32>,
-    least: f64,
+    pub(super) roads: Crossroads,
+    /// Chords held at lengths, the chord of every arc, the least length and the fewest quads across every chord.
+    pub(super) spacing: Spacing,
+    pub(super) chord_of: Vec<u32>,
+    pub(super) least: f64,
+    pub(super) fewest: Vec<u32>,
     /// The ends of arcs at each node.
     ends: Vec<Vec<ArcEnd>>,
     guided: GuidedSystem,
     seamless: Option<SeamlessSystem>,
     sizes: Option<SpdSymbolic>,
-    state: State,
+    pub(super) state: State,
     /// Factor of the steps of every node.
     pace: Vec<f64>,
     /// Where every node was headed when it last moved.
@@ -148,7 +153,6 @@ impl<'a> Optimizer<'a> {
             sharp: &sharp,
             roads: &roads,
             spacing: &spacing,
-            least,
             guided: &guided,
             seamless: None,
             sizes: None,
@@ -166,6 +170,7 @@ impl<'a> Optimizer<'a> {
             spacing,
             chord_of: layout.arcs.iter().map(|a| a.chord).collect(),
             least,
+            fewest: layout.least_quads(),
             ends,
             guided,
             seamless,
@@ -186,6 +191,30 @@ impl<'a> Optimizer<'a> {
     /// Whether no further step is to be made.
     pub fn is_done(&self) -> bool {
         self.steps >= self.settings.steps || self.halved > self.settings.halvings
+    }
+
+    /// The share of the steps at most that are made.
+    pub(super) fn share_done(&self) -> f64 {
+        self.steps as f64 / self.settings.steps.max(1) as f64
+    }
+
+    /// Begins anew with steps of usual length, as many as at first.
+    pub(super) fn restart(&mut self) {
+        self.pace.fill(1.0);
+        (self.halved, self.steps) = (0, 0);
+    }
+
+    /// For each node whether it stays where it is.
+    pub fn stays(&self) -> Vec<bool> {
+        self.ground.hold.iter().map(|&hold| hold == Hold::Fixed).collect()
+    }
+
+    /// The chords that are shorter than `least`, or would be shorter than triangles resolve, with their lengths.
+    pub fn short_chords(&self, least: f64) -> Vec<(u32, f64)> {
+        let (net, map) = (&self.state.net, &self.state.solution.map);
+        let found = lengths(net, &self.roads, &self.chord_of, map, self.spacing.held.len());
+        let short = |chord: u32, length: f64| self.spacing.held[chord as usize].is_some() || length < least;
+        (0..).zip(found).filter_map(|(c, l)| Some((c, l?.1))).filter(|&(c, l)| short(c, l)).collect()
     }
 
     /// Moves the nodes once; tells whether that made the energy less. If not, they are where they were, and the next
@@ -329,6 +358,9 @@ impl<'a> Optimizer<'a> {
                 break;
             }
         }
+        if let Some(edge) = self.settings.integer {
+            self.round(edge, progress)?;
+        }
         self.stiffen(progress)?;
         let State { net, metric, field, objective, solution } = &mut self.state;
         let Some(system) = &self.seamless else { return Ok((self.state, Vec::new())) };
@@ -386,14 +418,13 @@ impl<'a> Optimizer<'a> {
     }
 
     /// Field and map of a net, with the field at hand as the one before.
-    fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
+    pub(super) fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
         let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
             roads: &self.roads,
             spacing: &self.spacing,
-            least: self.least,
             guided: &self.guided,
             seamless: self.seamless.take(),
             sizes: self.sizes.take(),

@@ -8,12 +8,14 @@
 
 mod alignment;
 mod bending;
+mod collapse;
 mod cross;
 mod descent;
 mod emerge;
 mod gradient;
 mod guides;
 mod injective;
+mod integer;
 mod lift;
 mod march;
 mod measures;
@@ -41,6 +43,7 @@ mod samples;
 mod tests;
 
 pub use bending::face_curvature;
+pub use collapse::{CollapsedChord, ShortChord};
 pub use descent::{Optimizer, Settings, Surface};
 pub use emerge::{EmergeError, Emerged, emerge};
 pub use guides::{feature_guides, shape_guides};

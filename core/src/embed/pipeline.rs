@@ -3,15 +3,16 @@
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
+use super::collapse::{Collapse, CollapsedChord, ShortChord};
 use super::descent::{Optimizer, Settings, Surface};
 use super::measures::{Measures, measure_patches};
 use super::net::Headings;
 use super::solver::State;
 use super::trace::{ArcChain, Folds, preview_arcs, trace_arcs};
-use super::{EmbeddingError, emerge, map_rectangles};
-use crate::layout::{Embedding, PatchMap, QuadLayout};
+use super::{EmbeddingError, emerge, headings, map_rectangles};
+use crate::layout::{Embedding, PatchMap, QuadLayout, Redrawn, redraw};
 use crate::mesh::VertexId;
-use crate::param::{FoldReason, Residual, residuals};
+use crate::param::{Fold, FoldReason, Residual, residuals};
 use crate::progress::Progress;
 
 /// How far the isolines that complete a partial layout are followed, in square roots of the surface's area: many times
@@ -85,6 +86,10 @@ pub struct EmbeddingReport {
     pub flipped_at_rest: usize,
     /// Those left.
     pub folds: Vec<RemainingFold>,
+    /// Chords that were collapsed, in order.
+    pub collapsed: Vec<CollapsedChord>,
+    /// Chords that were to be collapsed and could not be.
+    pub short: Vec<ShortChord>,
     /// Measures of all patches together.
     pub measures: Measures,
 }
@@ -98,6 +103,8 @@ pub struct Embedded {
     pub embedding: Embedding,
     /// The maps of its patches.
     pub maps: Vec<PatchMap>,
+    /// Where chords were collapsed, the rough drawing of what was left of the layout.
+    pub drawing: Option<Embedding>,
     /// What was achieved.
     pub report: EmbeddingReport,
 }
@@ -163,22 +170,164 @@ pub fn optimise(
 ) -> Result<Embedded, EmbeddingError> {
     progress.report("Embedding the layout", 0.0);
     let mut optimizer = Optimizer::new(job, progress)?;
-    let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
-    let energy_before = optimizer.state().solution.energy / area;
-    let flipped_before = optimizer.state().flipped();
-    let mut next = watch(&optimizer.state().snapshot(0));
-    let mut steps = 0;
-    while next == Next::Continue && !optimizer.is_done() {
-        progress.report("Moving nodes", 0.05 + 0.75 * steps as f64 / job.settings.steps.max(1) as f64);
-        let better = optimizer.step(progress)?;
-        steps += 1;
-        if better {
-            next = watch(&optimizer.state().snapshot(steps));
+    let mut course = Course::begin(job, &optimizer, watch);
+    course.rest(&mut optimizer, progress)?;
+    let Some(least) = job.settings.collapse.filter(|_| !job.layout.patches.is_empty()) else {
+        return course.finish(job, optimizer, progress);
+    };
+    let stays = optimizer.stays();
+    let mut collapse = Collapse::new(job.layout, stays.clone());
+    let mut round = Shorter::none(job);
+    loop {
+        let short = round.numbers(optimizer.short_chords(least));
+        let before = collapse.done.len();
+        let again = course.next == Next::Continue && collapse.choose(short);
+        let redrawn = again.then(|| {
+            redraw(job.layout, job.drawing, &collapse.gone, |n| stays[n], job.surface.mesh.n_vertices(), progress)
+        });
+        progress.check()?;
+        match redrawn {
+            Some(Ok(redrawn)) => round = Shorter::new(job, redrawn),
+            Some(Err(error)) => {
+                collapse.take_back(before, &error.to_string());
+                return course.finish_shorter(job, &round, collapse, optimizer, progress);
+            }
+            None => return course.finish_shorter(job, &round, collapse, optimizer, progress),
+        }
+        tracing::debug!(gone = collapse.done.len(), "chords collapsed");
+        optimizer = Optimizer::new(&round.job(job), progress)?;
+        course.show(&optimizer);
+        course.rest(&mut optimizer, progress)?;
+    }
+}
+
+/// The course of an optimisation.
+struct Course<'w> {
+    watch: &'w mut dyn FnMut(&Snapshot) -> Next,
+    next: Next,
+    steps: usize,
+    area: f64,
+    energy_before: f64,
+    flipped_before: usize,
+}
+
+impl<'w> Course<'w> {
+    fn begin(job: &Job<'_>, optimizer: &Optimizer<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+        let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
+        let energy_before = optimizer.state().solution.energy / area;
+        let flipped_before = optimizer.state().flipped();
+        let next = watch(&optimizer.state().snapshot(0));
+        Self { watch, next, steps: 0, area, energy_before, flipped_before }
+    }
+
+    fn show(&mut self, optimizer: &Optimizer<'_>) {
+        self.next = (self.watch)(&optimizer.state().snapshot(self.steps));
+    }
+
+    /// Moves the nodes until they rest.
+    fn rest(&mut self, optimizer: &mut Optimizer<'_>, progress: &Progress) -> Result<(), EmbeddingError> {
+        while self.next == Next::Continue && !optimizer.is_done() {
+            progress.report("Moving nodes", 0.05 + 0.75 * optimizer.share_done());
+            let better = optimizer.step(progress)?;
+            self.steps += 1;
+            if better {
+                self.show(optimizer);
+            }
+        }
+        Ok(())
+    }
+
+    /// From nodes at rest to the finished embedding.
+    fn finish(
+        mut self,
+        job: &Job<'_>,
+        mut optimizer: Optimizer<'_>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        if let Some(edge) = job.settings.integer {
+            progress.report("Rounding lengths", 0.8);
+            optimizer.round(edge, progress)?;
+            self.show(&optimizer);
+            self.rest(&mut optimizer, progress)?;
+        }
+        let flipped_at_rest = optimizer.state().flipped();
+        progress.report("Removing folds", 0.8);
+        let (state, folds) = optimizer.finish(progress)?;
+        let mut done = finished(job, &state, &folds, self.area, progress)?;
+        let before = (self.steps, self.energy_before, self.flipped_before, flipped_at_rest);
+        let report = &mut done.report;
+        (report.steps, report.energy_before, report.flipped_before, report.flipped_at_rest) = before;
+        Ok(done)
+    }
+
+    fn finish_shorter(
+        self,
+        job: &Job<'_>,
+        round: &Shorter,
+        collapse: Collapse<'_>,
+        optimizer: Optimizer<'_>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let mut done = self.finish(&round.job(job), optimizer, progress)?;
+        (done.report.collapsed, done.report.short) = (collapse.done, collapse.kept);
+        done.drawing = round.redrawn.as_ref().map(|r| r.embedding.clone());
+        Ok(done)
+    }
+}
+
+/// What is left of a job's layout without the chords that were collapsed.
+struct Shorter {
+    /// `None` as long as none was.
+    redrawn: Option<Redrawn>,
+    headings: Vec<Headings>,
+    pinned_nodes: Vec<bool>,
+    pinned_arcs: Vec<bool>,
+}
+
+impl Shorter {
+    fn none(job: &Job<'_>) -> Self {
+        Self {
+            redrawn: None,
+            headings: job.headings.to_vec(),
+            pinned_nodes: job.pinned_nodes.to_vec(),
+            pinned_arcs: job.pinned_arcs.to_vec(),
         }
     }
-    let flipped_at_rest = optimizer.state().flipped();
-    progress.report("Removing folds", 0.8);
-    let (state, folds) = optimizer.finish(progress)?;
+
+    fn new(job: &Job<'_>, redrawn: Redrawn) -> Self {
+        let mut pinned_nodes = vec![false; redrawn.layout.nodes.len()];
+        for (&new, _) in redrawn.nodes.iter().zip(job.pinned_nodes).filter(|pair| *pair.1) {
+            pinned_nodes[new as usize] = true;
+        }
+        let mut pinned_arcs = vec![false; redrawn.layout.arcs.len()];
+        for (new, _) in redrawn.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {
+            new.iter().for_each(|&a| pinned_arcs[a as usize] = true);
+        }
+        Self { headings: headings(&redrawn.layout), pinned_nodes, pinned_arcs, redrawn: Some(redrawn) }
+    }
+
+    fn job<'s>(&'s self, job: &Job<'s>) -> Job<'s> {
+        let (layout, drawing) = self.redrawn.as_ref().map_or((job.layout, job.drawing), |r| (&r.layout, &r.embedding));
+        let Self { headings, pinned_nodes, pinned_arcs, .. } = self;
+        Job { layout, drawing, headings, pinned_nodes, pinned_arcs, ..*job }
+    }
+
+    /// The same chords, by their numbers in the layout that was given.
+    fn numbers(&self, chords: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+        let Some(redrawn) = &self.redrawn else { return chords };
+        let before = |chord: u32| redrawn.chords.iter().position(|&c| c == Some(chord));
+        chords.into_iter().filter_map(|(c, length)| Some((before(c)? as u32, length))).collect()
+    }
+}
+
+/// Arcs and patches of a map that is done. The report lacks what happened before.
+fn finished(
+    job: &Job<'_>,
+    state: &State,
+    folds: &[Fold],
+    area: f64,
+    progress: &Progress,
+) -> Result<Embedded, EmbeddingError> {
     progress.report("Tracing arcs", 0.9);
     let strict = if folds.is_empty() { Folds::Refuse } else { Folds::Cross };
     let (mesh, map) = (&state.net.mesh, &state.solution.map);
@@ -209,13 +358,15 @@ pub fn optimise(
         FoldReason::NotResolved => "no map without this fold was found".to_owned(),
     };
     let report = EmbeddingReport {
-        steps,
-        energy_before,
+        steps: 0,
+        energy_before: 0.0,
         energy_after: state.solution.energy / area,
-        flipped_before,
-        flipped_at_rest,
+        flipped_before: 0,
+        flipped_at_rest: 0,
         folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),
+        collapsed: Vec::new(),
+        short: Vec::new(),
         measures,
     };
-    Ok(Embedded { layout, embedding, maps, report })
+    Ok(Embedded { layout, embedding, maps, drawing: None, report })
 }

@@ -47,7 +47,6 @@ pub(super) struct Solver<'s> {
     pub sharp: &'s [bool],
     pub roads: &'s Crossroads,
     pub spacing: &'s Spacing,
-    pub least: f64,
     pub guided: &'s GuidedSystem,
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
@@ -96,7 +95,7 @@ impl Solver<'_> {
         if !self.features {
             features.clear();
         }
-        let mut spacing = self.spacing.relations(net, self.roads, self.least);
+        let mut spacing = self.spacing.relations(net, self.roads);
         let mut system = self.seamless.take();
         loop {
             let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();

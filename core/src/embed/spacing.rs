@@ -1,4 +1,4 @@
-//! Keeping nodes apart (Campen, section 6.9).
+//! Holding chords at lengths: nodes that keep apart (Campen, section 6.9), whole multiples of an edge (section 6.7).
 //!
 //! All arcs of a chord have one length in the map. Where it falls below a least one it is held there by one more
 //! relation, so that patches stay wide enough to be resolved by triangles, and separatrices do not change places.
@@ -8,20 +8,31 @@ use super::straight::{Crossroads, corner};
 use crate::mesh::TriMesh;
 use crate::param::{Relation, SeamlessMap, Transition};
 
-/// The arcs whose chords are to be held at the least length, one for each chord.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+/// A chord that is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Held {
+    /// The arc that is held.
+    pub arc: u32,
+    /// Its length.
+    pub length: f64,
+    /// Whether that is a multiple of an edge, and not just the least length.
+    pub whole: bool,
+}
+
+/// The chords that are to be held at lengths.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Spacing {
-    /// For each chord the arc that is held.
-    pub arcs: Vec<Option<u32>>,
+    /// For each chord whether it is held, and how.
+    pub held: Vec<Option<Held>>,
 }
 
 impl Spacing {
     /// Nothing held, for so many chords.
     pub(super) fn none(chords: usize) -> Self {
-        Self { arcs: vec![None; chords] }
+        Self { held: vec![None; chords] }
     }
 
-    /// Adds the chords that are shorter than `least` in `map`; returns how many.
+    /// Holds the chords at `least` that are shorter in `map`; returns how many.
     pub(super) fn extend(
         &mut self,
         net: &Net,
@@ -31,29 +42,46 @@ impl Spacing {
         least: f64,
     ) -> usize {
         let mut added = 0;
-        for (a, &chord) in (0u32..).zip(chord_of) {
-            if self.arcs[chord as usize].is_none() && length(net, roads, map, a).is_some_and(|l| l < least) {
-                self.arcs[chord as usize] = Some(a);
+        for (arc, &chord) in (0u32..).zip(chord_of) {
+            let held = &mut self.held[chord as usize];
+            if held.is_none() && length(net, roads, map, arc).is_some_and(|l| l < least) {
+                *held = Some(Held { arc, length: least, whole: false });
                 added += 1;
             }
         }
         added
     }
 
-    /// The relations that hold the chords at `least`.
-    pub(super) fn relations(&self, net: &Net, roads: &Crossroads, least: f64) -> Vec<Relation> {
-        let relation = |a: u32| {
-            let span = roads.span(net, a)?;
+    /// The relations that hold the chords.
+    pub(super) fn relations(&self, net: &Net, roads: &Crossroads) -> Vec<Relation> {
+        let relation = |held: &Held| {
+            let span = roads.span(net, held.arc)?;
             Some(Relation {
                 from: corner(span.start),
                 crossed: span.crossed,
                 to: corner(span.end),
                 axis: span.heading % 2,
-                difference: if span.heading < 2 { least } else { -least },
+                difference: if span.heading < 2 { held.length } else { -held.length },
             })
         };
-        self.arcs.iter().flatten().filter_map(|&a| relation(a)).collect()
+        self.held.iter().flatten().filter_map(relation).collect()
     }
+}
+
+/// For each chord an arc of it whose length the map tells, and that length.
+pub(super) fn lengths(
+    net: &Net,
+    roads: &Crossroads,
+    chord_of: &[u32],
+    map: &SeamlessMap,
+    chords: usize,
+) -> Vec<Option<(u32, f64)>> {
+    let mut found = vec![None; chords];
+    for (a, &chord) in (0u32..).zip(chord_of) {
+        let at = &mut found[chord as usize];
+        *at = at.or_else(|| length(net, roads, map, a).map(|l| (a, l)));
+    }
+    found
 }
 
 /// The length of an arc in the map, negative where its ends have changed places; `None` where the map does not tell yet.

@@ -82,7 +82,7 @@ pub struct Embedding {
     pub seeds: Vec<u32>,
 }
 
-/// Embeds `layout`, the dual of `arrangement`. `preferred` names, per region, a vertex of the original mesh
+/// Embeds `layout`, the dual of `arrangement`. `preferred` names, per region, a vertex of the arrangement's mesh
 /// where the node should lie, such as a field singularity.
 ///
 /// # Errors
@@ -163,7 +163,9 @@ impl RegionPart {
         }
         let disc = mesh.to_mesh().map_err(|source| EmbedError::NoDisc { region: r, source })?;
         let node = match stretch {
-            Some(k) => boundary_node(&disc, &sides[k]),
+            Some(k) => boundary_node(&disc, &sides[k], |v| {
+                preferred.is_some_and(|p| piece.whole.get(v as usize) == Some(&p.0))
+            }),
             None => preferred
                 .and_then(|v| piece.whole.iter().position(|&w| w == v.0))
                 .filter(|&v| !disc.is_boundary_vertex(VertexId::new(v)))
@@ -212,7 +214,7 @@ fn boundary_halves(border: &[crate::dual::Side], stretch: &[u32], k: usize, node
 }
 
 /// The map of a disc onto the round unit disc, every side on an equal share of the circle.
-fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveError> {
+pub(super) fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveError> {
     let mut fixed = vec![None; disc.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
         let along = lengths(disc.positions(), side);
@@ -263,8 +265,8 @@ fn innermost(disc: &TriMesh) -> u32 {
     inner.max_by(|a, b| distance[a.index()].total_cmp(&distance[b.index()])).map_or(0, |v| v.0)
 }
 
-/// The vertex inside a boundary stretch where the node goes: its sharpest corner, or its middle.
-fn boundary_node(disc: &TriMesh, stretch: &[u32]) -> u32 {
+/// The vertex inside a boundary stretch where the node goes: its sharpest corner, or the one preferred, or its middle.
+fn boundary_node(disc: &TriMesh, stretch: &[u32], preferred: impl Fn(u32) -> bool) -> u32 {
     let turn = |v: u32| {
         let angle: f64 = disc.outgoing(VertexId(v)).map(|h| disc.corner_angle(h)).sum();
         (std::f64::consts::PI - angle).abs()
@@ -274,7 +276,8 @@ fn boundary_node(disc: &TriMesh, stretch: &[u32]) -> u32 {
     let inner = 1..stretch.len() - 1;
     let sharpest = inner.clone().max_by(|&i, &j| turn(stretch[i]).total_cmp(&turn(stretch[j])));
     let middle = inner.min_by(|&i, &j| (along[i] - half).abs().total_cmp(&(along[j] - half).abs()));
-    match (sharpest, middle) {
+    let preferred = (1..stretch.len() - 1).find(|&i| preferred(stretch[i]));
+    match (sharpest, preferred.or(middle)) {
         (Some(i), _) if turn(stretch[i]) > CORNER_TURN => stretch[i],
         (_, Some(i)) => stretch[i],
         _ => stretch[0],

@@ -1,16 +1,19 @@
 //! Quad layouts: their structure, read off an arrangement of dual curves, and a first embedding.
 //!
 //! Data flows [`structure`] → [`embed`] (nodes and arcs on the surface) → [`patch`] (each patch mapped to a
-//! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. The room knows arrangements,
-//! not how their curves came about.
+//! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. [`collapse`] deletes chords of a
+//! layout, [`redraw`] draws what is left. The room knows arrangements, not how their curves came about.
 
+mod collapse;
 mod disc;
 mod embed;
 mod file;
 mod patch;
 mod piece;
+mod redraw;
 mod structure;
 
+pub use collapse::{CollapseError, Collapsed};
 pub(crate) use disc::flipped;
 pub use embed::{EmbedError, Embedding, embed};
 pub use file::{
@@ -20,4 +23,5 @@ pub use file::{
 pub(crate) use patch::{Lookup, border_sides, flood};
 pub use patch::{PatchError, PatchMap, map_patches};
 pub(crate) use piece::Piece;
+pub use redraw::{RedrawError, Redrawn, redraw};
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};

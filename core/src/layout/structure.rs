@@ -206,6 +206,31 @@ impl QuadLayout {
         Ok(())
     }
 
+    /// The least numbers of quads across the chords with which a refinement is a mesh: no arc is cut short to join a node
+    /// to itself, no two join the same nodes, and no patch has a node at two corners.
+    pub fn least_quads(&self) -> Vec<u32> {
+        let mut least = vec![1; self.chords];
+        let mut raise = |arc: u32, to: u32| {
+            let least = &mut least[self.arcs[arc as usize].chord as usize];
+            *least = to.max(*least);
+        };
+        let mut between = std::collections::HashMap::new();
+        for (a, arc) in (0..).zip(&self.arcs) {
+            let [p, q] = arc.nodes;
+            if p == q {
+                raise(a, 3);
+            } else if let Some(other) = between.insert([p.min(q), p.max(q)], a) {
+                raise(a, 2);
+                raise(other, 2);
+            }
+        }
+        for patch in self.patches.iter().filter(|p| p.corners[0] == p.corners[2] || p.corners[1] == p.corners[3]) {
+            raise(patch.sides[0].0, 2);
+            raise(patch.sides[1].0, 2);
+        }
+        least
+    }
+
     /// Number of irregular nodes.
     pub fn n_irregular(&self) -> usize {
         self.nodes.iter().filter(|n| !n.is_regular()).count()

@@ -7,5 +7,5 @@ mod refine;
 mod shape;
 mod smooth;
 
-pub use refine::{QuadMesh, chord_counts, refine};
+pub use refine::{QuadMesh, chord_counts, refine, whole_counts};
 pub use smooth::{land, quality, scaled_jacobians, smooth};

@@ -43,6 +43,22 @@ pub fn chord_counts(layout: &QuadLayout, maps: &[PatchMap], target: f64) -> Vec<
 
 const MIN_QUADS: u32 = 3;
 
+/// The number of quads across every chord where all chords are multiples of `edge` in the maps, and by what share of an
+/// edge some chord is off at most.
+pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
+    let mut counts = vec![1; layout.chords];
+    let mut off = 0.0f64;
+    for (p, map) in layout.patches.iter().zip(maps) {
+        for (i, length) in [(0, map.size.x), (1, map.size.y)] {
+            let chord = layout.arcs[p.sides[i].0 as usize].chord as usize;
+            let count = (length / edge).round().clamp(1.0, 1e4);
+            off = off.max((length / edge - count).abs());
+            counts[chord] = count as u32;
+        }
+    }
+    (counts, off)
+}
+
 /// Refines every patch to a grid of as many quads as `counts` says for its two chords.
 pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], counts: &[u32]) -> QuadMesh {
     let position = |v: u32| embedding.mesh.positions[v as usize];

@@ -16,7 +16,7 @@ use crate::embed::{
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, write_obj};
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, chord_counts, land, quality, refine, smooth};
+use crate::quad::{QuadMesh, chord_counts, land, quality, refine, smooth, whole_counts};
 use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
@@ -35,12 +35,25 @@ pub struct ExportOptions {
     pub size: QuadSize,
     /// How the embedding is optimised; `None`: the drawing is written.
     pub embedding: Option<Settings>,
+    /// Whether patches are to be as wide and high as multiples of a quad's edge.
+    pub integer: bool,
+    /// Whether arcs that want to be shorter than this are to be collapsed.
+    pub collapse: Option<Shortest>,
+}
+
+/// The length below which arcs are collapsed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shortest {
+    /// The edge length of the quads.
+    Quad,
+    /// This one, in units of the file.
+    Length(f64),
 }
 
 impl Default for ExportOptions {
     fn default() -> Self {
         // Fine enough that the quads follow the surface to well below half a percent of its size.
-        Self { size: QuadSize::Count(6000), embedding: Some(Settings::default()) }
+        Self { size: QuadSize::Count(6000), embedding: Some(Settings::default()), integer: false, collapse: None }
     }
 }
 
@@ -126,10 +139,19 @@ pub fn finish(
     let Drawn { layout, embedding: drawing } = drawn;
     let mut seconds = Times::new();
     let start = Instant::now();
+    let edge = edge_length(options.size, sketch);
     let optimised = match (embedded, options.embedding) {
         (Some(embedded), _) => Some(Ok(embedded.clone())),
         (None, None) => None,
         (None, Some(settings)) => {
+            let settings = Settings {
+                integer: options.integer.then_some(edge),
+                collapse: options.collapse.map(|shortest| match shortest {
+                    Shortest::Quad => edge,
+                    Shortest::Length(length) => length / sketch.units.scale,
+                }),
+                ..settings
+            };
             let (pinned_nodes, pinned_arcs) = (&pinned.nodes[..], &pinned.arcs[..]);
             let job = Job { surface, layout, drawing, headings, pinned_nodes, pinned_arcs, settings };
             Some(embed::optimise(&job, progress, watch))
@@ -141,12 +163,15 @@ pub fn finish(
     let start = Instant::now();
     let rough = (!layout.patches.is_empty()).then(|| map_patches(layout, drawing, progress));
     progress.check()?;
-    let before = Before::new(drawing, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
+    let mut before = Before::new(drawing, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
     let kept = optimised.as_ref().and_then(|o| o.as_ref().ok()).filter(|_| embedded.is_none());
     let problem = kept.and_then(|e| no_better(&e.report, before.measures.as_ref()));
     let (layout, embedding, maps, optimised) = match (optimised, rough) {
         (Some(Ok(_)), Some(Ok(maps))) if problem.is_some() => (layout.clone(), drawing.clone(), maps, problem.map(Err)),
-        (Some(Ok(e)), _) => (e.layout, e.embedding, e.maps, Some(Ok(e.report))),
+        (Some(Ok(e)), _) => {
+            before.drawing = e.drawing.unwrap_or(before.drawing);
+            (e.layout, e.embedding, e.maps, Some(Ok(e.report)))
+        }
         (Some(Err(error)), None) => return Err(error.into()),
         (None, None) => return Err(WeaveError::Incomplete),
         (failed, Some(maps)) => {
@@ -155,7 +180,18 @@ pub fn finish(
         }
     };
     let done = matches!(optimised, Some(Ok(_)));
-    let quads = quads(sketch, (&layout, &embedding, &maps), done, options.size, progress)?;
+    let counts = if done && options.integer && embedded.is_none() {
+        let (counts, off) = whole_counts(&layout, &maps, edge);
+        tracing::debug!(off, "patches of whole quads");
+        counts
+    } else {
+        let target = match options.size {
+            QuadSize::EdgeLength(_) => edge,
+            QuadSize::Count(n) => edge_for_count(&maps, n),
+        };
+        chord_counts(&layout, &maps, target)
+    };
+    let quads = quads(sketch, (&layout, &embedding, &maps), done, &counts, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
@@ -183,17 +219,12 @@ fn quads(
     sketch: &Sketch<'_>,
     (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
     optimised: bool,
-    size: QuadSize,
+    counts: &[u32],
     progress: &Progress,
 ) -> Result<QuadMesh, WeaveError> {
     let surface = sketch.surface;
     progress.report("Refining to quads", 0.97);
-    let target = match size {
-        QuadSize::EdgeLength(length) => length / sketch.units.scale,
-        QuadSize::Count(n) => edge_for_count(maps, n),
-    };
-    let counts = chord_counts(layout, maps, target);
-    let mut quads = refine(layout, embedding, maps, &counts);
+    let mut quads = refine(layout, embedding, maps, counts);
     if optimised {
         land(&mut quads, surface.mesh);
     }
@@ -202,6 +233,15 @@ fn quads(
         smooth(&mut quads, surface.mesh, progress)?;
     }
     Ok(quads)
+}
+
+/// The edge length of quads before patches are mapped, on a surface of bounding-box diagonal 1.
+fn edge_length(size: QuadSize, sketch: &Sketch<'_>) -> f64 {
+    let mesh = sketch.surface.mesh;
+    match size {
+        QuadSize::EdgeLength(length) => length / sketch.units.scale,
+        QuadSize::Count(n) => (mesh.faces().map(|f| mesh.face_area(f)).sum::<f64>() / f64::from(n.max(1))).sqrt(),
+    }
 }
 
 /// The edge length at which the patches' rectangles hold about `n` quads.

@@ -80,7 +80,7 @@ impl OpenedLayout {
         Ok(())
     }
 
-    /// Embeds the layout and writes `layout.layout`, the layout as it was given, the meshes and `report.json`; the
+    /// Embeds the layout and writes `layout.layout`, the layout as it was given but for chords collapsed, the meshes and `report.json`; the
     /// inner result is the layout, or why there is none.
     ///
     /// # Errors
@@ -105,10 +105,14 @@ impl OpenedLayout {
         };
         let result = finish(&sketch, None, options, progress, watch);
         progress.check()?;
-        self.file.write(&folder.join("layout.layout"))?;
+        let mut file = self.file.clone();
         if let Ok(export) = &result {
             export.write(folder, &self.loaded.units)?;
+            if export.has_collapsed() {
+                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.before.drawing)?;
+            }
         }
+        file.write(&folder.join("layout.layout"))?;
         write_report(folder, Subject::File(&self.loaded, &self.topology), &result, seconds, mesh)?;
         Ok(result)
     }

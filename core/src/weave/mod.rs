@@ -19,7 +19,7 @@ mod woven;
 
 pub use design::{Design, DesignError, Pin, Strip, StripId};
 pub use embedding::{Drawn, PinnedParts, draw, optimise};
-pub use export::{Export, ExportOptions, QuadSize, Sketch, Watch, export, finish, write_all};
+pub use export::{Export, ExportOptions, QuadSize, Shortest, Sketch, Watch, export, finish, write_all};
 pub use layout::OpenedLayout;
 pub use model::{Model, Options};
 pub use report::{Before, Times};

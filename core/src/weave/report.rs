@@ -11,7 +11,7 @@ use super::design::Strip;
 use super::export::{Export, write_file};
 use super::session::{Session, WeaveError};
 use crate::dual::{Colour, RegionReport};
-use crate::embed::{Measures, Surface, face_curvature, measure_patches};
+use crate::embed::{CollapsedChord, Measures, ShortChord, Surface, face_curvature, measure_patches};
 use crate::layout::{Embedding, PatchMap};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
 use crate::quad::quality;
@@ -129,6 +129,9 @@ struct Course {
     flipped_before: usize,
     flipped_at_rest: usize,
     folds: Vec<FoldSection>,
+    /// Chords that were collapsed, in order, and those that were to be and could not be.
+    collapsed: Vec<CollapsedChord>,
+    short: Vec<ShortChord>,
 }
 
 #[derive(Serialize)]
@@ -246,6 +249,7 @@ fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
 fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
     let (measures, patches, _) = measure_patches(&e.maps, &e.before.bending);
     let done = e.optimised.as_ref().and_then(|result| result.as_ref().ok());
+    let scale = loaded.units.scale;
     let course = done.map(|r| Course {
         steps: r.steps,
         energy_before: r.energy_before,
@@ -260,6 +264,8 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
                 reason: f.reason.clone(),
             })
             .collect(),
+        collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
+        short: r.short.iter().map(|c| ShortChord { length: c.length * scale, ..c.clone() }).collect(),
     });
     let patch = |p: &crate::embed::PatchMeasures| PatchSection {
         aspect: p.aspect,
@@ -277,6 +283,11 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
 }
 
 impl Export {
+    /// Whether chords of the layout were collapsed.
+    pub fn has_collapsed(&self) -> bool {
+        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed.is_empty())
+    }
+
     /// The measures of the embedding that is written.
     pub fn measures(&self) -> Measures {
         measure_patches(&self.maps, &self.before.bending).0

@@ -7,17 +7,14 @@
 use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
-use super::descent::Surface;
+use super::descent::{Optimizer, Surface};
 use super::net::Net;
 use super::pipeline::Job;
-use super::solver::{Solver, State};
-use super::spacing::Spacing;
-use super::straight::Crossroads;
+use super::solver::{Aim, Start, State};
 use crate::dual::{Mark, RefinedMesh};
-use crate::field::{GuidedSystem, Metric};
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::param::{InjectiveEnergy, Shape};
+use crate::param::Shape;
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
@@ -31,15 +28,12 @@ pub(super) struct Drawn {
     pub embedding: Embedding,
     /// The coordinates of the corners of each triangle, in the chart of its patch.
     pub uv: Vec<[DVec2; 3]>,
-    /// Triangles that are turned over or flat.
-    pub flipped: usize,
 }
 
 impl Drawn {
     /// Maps the patches of a drawing and puts them together again.
     pub(super) fn new(layout: &QuadLayout, drawing: &Embedding, progress: &Progress) -> Result<Self, EmbeddingError> {
         let maps = map_patches(layout, drawing, progress)?;
-        let flipped = maps.iter().map(|m| m.flipped).sum();
         let mut positions: Vec<DVec3> = drawing.mesh.positions.clone();
         let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
         let mut seeds = Vec::with_capacity(maps.len());
@@ -71,56 +65,47 @@ impl Drawn {
             seeds,
             mesh: refined,
         };
-        Ok(Self { mesh, base_face, embedding, uv, flipped })
+        Ok(Self { mesh, base_face, embedding, uv })
     }
 }
 
-/// How steps are counted when nothing else ends them: Newton's method has long converged by then.
+/// How much misalignment counts, and size beside shape. Measured on layouts of the benchmark page: less anisotropy lets
+/// arcs stray from principal directions, more costs angles; size is to keep patches of one strip from shrinking away, not
+/// to be paid for by angles.
+pub(super) const SHAPE: Shape = Shape { anisotropy: 3.0, size: 0.1 };
+/// Steps of Newton's method for a first map: it has long converged by then.
 const STEPS: usize = 60;
-/// How much size counts beside shape: enough to keep patches of one strip from shrinking away, little enough not to be
-/// paid for by angles.
-const SIZE: f64 = 0.1;
 
-/// The map of least energy without folds, on the mesh of the drawing.
-pub(super) fn solve(job: &Job<'_>, anisotropy: f64, progress: &Progress) -> Result<(State, Vec<u32>), EmbeddingError> {
-    let Job { surface, layout, settings, .. } = *job;
-    let drawn = Drawn::new(layout, job.drawing, progress)?;
-    let net = Net::new(&drawn.mesh, &drawn.embedding, layout, job.headings)?;
-    let sharp = drawn.sharp(&surface);
-    let curvature = drawn.curvature(&surface);
-    let mut roads = Crossroads::new(layout, |_| true);
-    roads.hold_all();
-    let spacing = Spacing::none(layout.chords);
-    let guided = GuidedSystem::new(&net.mesh)?;
-    let metric = Metric::new(&net.mesh);
-    let mut solver = Solver {
-        curvature: &curvature,
-        sharp: &sharp,
-        roads: &roads,
-        spacing: &spacing,
-        least: 0.0,
-        guided: &guided,
-        seamless: None,
-        sizes: None,
-        settings,
-        features: false,
-    };
-    let mut state = solver.solve(net, metric, None, progress)?;
-    let Some(mut system) = solver.seamless else { return Ok((state, drawn.base_face)) };
-    let free = system.fit(&state.metric, &drawn.uv)?;
-    let shape = Shape { anisotropy, size: SIZE };
-    let energy = InjectiveEnergy::new(&state.metric, &state.field.angle, &state.objective, shape);
-    let before = drawn.flipped;
-    let Some(mut at) = system.injective(&energy, free) else {
-        tracing::debug!(before, "the drawing folds");
-        return Ok((state, drawn.base_face));
-    };
-    let newton = system.newton()?;
-    system.descend(&newton, &energy, &mut at, STEPS, progress)?;
-    state.solution.map = at.map;
-    state.solution.free = at.free;
-    state.solution.energy = at.energy;
-    Ok((state, drawn.base_face))
+impl<'a> Optimizer<'a> {
+    /// Sets up an optimisation without folds that starts from the drawing. `None` if that folds itself.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Option<Self>, EmbeddingError> {
+        let drawn = Drawn::new(job.layout, job.drawing, progress)?;
+        let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
+        for f in &mut net.base_face {
+            *f = FaceId(drawn.base_face[f.index()]);
+        }
+        let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
+        let aim = Aim::Injective { shape: SHAPE, start: Start::Map(&drawn.uv), steps: STEPS };
+        Self::on(job, (net, sharp, curvature), (aim, false), progress)
+    }
+
+    /// Sets up an optimisation without folds that starts from where another has ended. `None` if that map folds.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn from_map(
+        job: &Job<'a>,
+        (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
+        progress: &Progress,
+    ) -> Result<Option<Self>, EmbeddingError> {
+        let aim = Aim::Injective { shape: SHAPE, start: Start::Map(&state.solution.map.uv), steps: STEPS };
+        Self::on(job, (state.net, sharp, curvature), (aim, true), progress)
+    }
 }
 
 impl Drawn {

@@ -12,6 +12,7 @@ mod collapse;
 mod cross;
 mod descent;
 mod emerge;
+mod finish;
 mod gradient;
 mod guides;
 mod injective;
@@ -97,6 +98,9 @@ pub enum EmbeddingError {
     /// The mesh with the nodes inserted is not a manifold.
     #[error("the layout's nodes do not fit into the mesh: {0}")]
     Mesh(#[from] TriMeshError),
+    /// No map without folds was found.
+    #[error("no map without folds was found")]
+    Folded,
     /// The arcs could not be traced in the map.
     #[error(transparent)]
     Trace(#[from] TraceError),

@@ -17,7 +17,8 @@ mod unfold;
 use thiserror::Error;
 
 pub use cut::{Cut, CutPath};
-pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape};
+pub(crate) use injective::Density;
+pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, gradients};
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};

@@ -65,23 +65,15 @@ impl Coordinate<'_> {
     }
 }
 
-/// A solved map, and the linear system it solves.
+/// A solved map.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The map, in the frames of the field.
     pub map: SeamlessMap,
     /// The free variables.
     pub free: Vec<f64>,
-    /// The energy of each triangle, without stiffness.
-    pub face_energy: Vec<f64>,
-    /// Their sum.
+    /// Its energy: of least squares without stiffness, or of maps without folds.
     pub energy: f64,
-    /// The matrix `H` of the free variables `y`: with stiffness the objective is `y' H y − 2 b y` and a constant.
-    pub matrix: SparseHermitian<f64>,
-    /// The right-hand side `b`.
-    pub rhs: Vec<f64>,
-    /// The factor of the matrix.
-    pub factor: SpdFactor<f64>,
 }
 
 impl SeamlessSystem {
@@ -237,7 +229,8 @@ impl SeamlessSystem {
         Ok(self.symbolic.insert(symbolic).factor(matrix)?)
     }
 
-    /// The map of least objective along `field`.
+    /// The map of least objective along `field`: the free variables `y` that minimise `y' H y − 2 b y` with the matrix
+    /// and right-hand side of [`Self::assemble`].
     ///
     /// # Errors
     ///
@@ -255,10 +248,8 @@ impl SeamlessSystem {
         progress.check()?;
         let free = factor.solve(&matrix, &rhs)?;
         let map = self.map(&free);
-        let each = residuals(metric, &field.angle, &map.uv, objective);
-        let face_energy: Vec<f64> = each.iter().map(|r| r.energy).collect();
-        let energy = face_energy.iter().sum();
-        Ok(Solution { map, free, face_energy, energy, matrix, rhs, factor })
+        let energy = residuals(metric, &field.angle, &map.uv, objective).iter().map(|r| r.energy).sum();
+        Ok(Solution { map, free, energy })
     }
 
     /// Removes the folds of the map with free variables `y`; see [`unfold`](super::unfold). `quarters` tells the angle

@@ -1,26 +1,33 @@
 //! The energy of a triangle per area, as a function of the matrix of its map.
 
+use super::Shape;
+
 /// What the energy depends on besides the matrix.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Density {
+pub(crate) struct Density {
     /// `ρ`.
-    pub anisotropy: f64,
+    anisotropy: f64,
     /// `λ`.
-    pub size: f64,
+    size: f64,
     /// The determinant wanted, `m`.
-    pub determinant: f64,
+    determinant: f64,
 }
 
 /// Sweeps of the Jacobi method: of 4 by 4 matrices it has converged to rounding after five.
 const SWEEPS: usize = 6;
 
 impl Density {
+    /// The energy of a triangle in which the gradients are to have the lengths given.
+    pub(crate) fn new(shape: Shape, [a, b]: [f64; 2]) -> Self {
+        Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b }
+    }
+
     fn weights(&self) -> [f64; 4] {
         [1.0, self.anisotropy, self.anisotropy, 1.0]
     }
 
     /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive.
-    pub fn value(&self, j: &[f64; 4]) -> Option<f64> {
+    pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
         let det = j[0] * j[3] - j[1] * j[2];
         let ratio = det / self.determinant;
         let e = 0.5 * (self.norm(j) / det + self.size * (ratio + 1.0 / ratio));
@@ -32,8 +39,13 @@ impl Density {
         self.weights().iter().zip(j).map(|(w, x)| w * x * x).sum()
     }
 
+    /// The derivatives of the energy by the entries of the matrix; of a matrix with positive determinant.
+    pub(crate) fn gradient(&self, j: &[f64; 4]) -> [f64; 4] {
+        self.derivatives(j).0
+    }
+
     /// Its gradient and its Hessian made positive semidefinite.
-    pub fn derivatives(&self, j: &[f64; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
+    pub(super) fn derivatives(&self, j: &[f64; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
         let det = j[0] * j[3] - j[1] * j[2];
         let turned = [j[3], -j[2], -j[1], j[0]];
         let weights = self.weights();

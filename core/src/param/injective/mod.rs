@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::assembly::Scatter;
 use super::constraints;
-use super::objective::Objective;
+use super::objective::{Local, Objective, hats};
 use super::seamless::SeamlessMap;
 use super::solve::SeamlessSystem;
 use super::{ParamError, expect_length};
@@ -28,7 +28,7 @@ use crate::field::Metric;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::progress::{Cancelled, Progress};
 use crate::solve::{SolveError, SparseHermitian, SpdSymbolic};
-use density::Density;
+pub(crate) use density::Density;
 
 /// Share of the way to the first flat triangle that a step may go.
 const SAFE: f64 = 0.8;
@@ -70,30 +70,29 @@ pub struct NewtonSystem {
     symbolic: SpdSymbolic,
 }
 
-/// The values and derivatives of all triangles.
-struct Local {
+/// The derivatives of the energy of a triangle.
+struct Derivatives {
     gradient: [f64; 6],
     /// The lower triangle, row by row, in the order u of the corners, v of the corners.
     hessian: [f64; 21],
 }
 
 impl SeamlessSystem {
-    /// The free variables of a map that satisfies all relations: `uv` in the frames of the field at the corners.
+    /// The free variables of the map whose gradients in the frame of the field, `∇u` and `∇v` of each triangle, come
+    /// nearest to those given: exactly these if they are those of a map that satisfies all relations.
     ///
     /// # Errors
     ///
     /// [`ParamError::WrongLength`] or [`ParamError::Solve`].
-    pub fn fit(&mut self, metric: &Metric, uv: &[[DVec2; 3]]) -> Result<Vec<f64>, ParamError> {
-        expect_length("the list of coordinates", uv.len(), self.cut().turn.len())?;
+    pub fn fit(&mut self, metric: &Metric, angle: &[f64], gradients: &[[f64; 4]]) -> Result<Vec<f64>, ParamError> {
+        expect_length("the list of angles", angle.len(), self.cut().turn.len())?;
+        expect_length("the list of gradients", gradients.len(), angle.len())?;
         let plain = Objective { anisotropy: 1.0, lengths: Vec::new(), stiffness: Vec::new() };
         let (matrix, rhs) = self.assemble_with(|f| {
-            let mut local = plain.local(metric, 0.0, f);
-            local.load = [0, 1].map(|k| {
-                let [aa, bb, cc, ab, ac, bc] = local.stiffness[k];
-                let [a, b, c] = uv[f.index()].map(|w| w[k]);
-                [aa * a + ab * b + ac * c, ab * a + bb * b + bc * c, ac * a + bc * b + cc * c]
-            });
-            local
+            let (area, hats) = (metric.area(f), hats(metric, angle[f.index()], f));
+            let [ux, uy, vx, vy] = gradients[f.index()];
+            let load = [DVec2::new(ux, uy), DVec2::new(vx, vy)].map(|g| hats.map(|hat| area * hat.dot(g)));
+            Local { load, ..plain.local(metric, angle[f.index()], f) }
         });
         Ok(self.factor(&matrix)?.solve(&matrix, &rhs)?)
     }
@@ -187,7 +186,7 @@ impl SeamlessSystem {
         energy: &InjectiveEnergy<'_>,
         uv: &[[DVec2; 3]],
     ) -> (SparseHermitian<f64>, Vec<f64>) {
-        let locals: Vec<Local> = uv.par_iter().enumerate().map(|(f, w)| energy.local(f, w)).collect();
+        let locals: Vec<Derivatives> = uv.par_iter().enumerate().map(|(f, w)| energy.derivatives(f, w)).collect();
         let mut open = newton.shares.zero.clone();
         let mut load = vec![0.0; self.seams().n_free()];
         for (f, local) in locals.iter().enumerate() {
@@ -230,37 +229,33 @@ impl<'a> InjectiveEnergy<'a> {
         Self { metric, angle, objective, shape }
     }
 
-    /// Gradients of the corners' hat functions in the frame of the field.
     fn hats(&self, f: usize) -> [DVec2; 3] {
-        super::objective::hats(self.metric, self.angle[f], FaceId::new(f))
+        hats(self.metric, self.angle[f], FaceId::new(f))
     }
 
     fn density(&self, f: usize) -> Density {
-        let [a, b] = self.objective.target(FaceId::new(f));
-        Density { anisotropy: self.shape.anisotropy, size: self.shape.size, determinant: a * b }
-    }
-
-    /// The matrix of a map in a triangle, as `(∇u, ∇v)`.
-    fn matrix(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {
-        let u = hats[0] * w[0].x + hats[1] * w[1].x + hats[2] * w[2].x;
-        let v = hats[0] * w[0].y + hats[1] * w[1].y + hats[2] * w[2].y;
-        [u.x, u.y, v.x, v.y]
+        Density::new(self.shape, self.objective.target(FaceId::new(f)))
     }
 
     /// The energy of a map; `None` where a triangle is turned over or flat.
     pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
         let each = |(f, w): (usize, &[DVec2; 3])| {
             let area = self.metric.area(FaceId::new(f));
-            Some(area * self.density(f).value(&Self::matrix(&self.hats(f), w))?)
+            Some(area * self.density(f).value(&matrix(&self.hats(f), w))?)
         };
         // Added up in order: the sum must not depend on threads.
         let parts: Vec<Option<f64>> = uv.par_iter().enumerate().map(each).collect();
         parts.into_iter().sum()
     }
 
-    fn local(&self, f: usize, w: &[DVec2; 3]) -> Local {
+    /// Number of triangles that a map turns over or flattens.
+    pub fn folds(&self, uv: &[[DVec2; 3]]) -> usize {
+        uv.iter().filter(|w| (w[1] - w[0]).perp_dot(w[2] - w[0]) <= 0.0).count()
+    }
+
+    fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> Derivatives {
         let (hats, area) = (self.hats(f), self.metric.area(FaceId::new(f)));
-        let (slope, bend) = self.density(f).derivatives(&Self::matrix(&hats, w));
+        let (slope, bend) = self.density(f).derivatives(&matrix(&hats, w));
         let mut gradient = [0.0; 6];
         let mut hessian = [0.0; 21];
         let mut entry = 0;
@@ -274,8 +269,20 @@ impl<'a> InjectiveEnergy<'a> {
                 entry += 1;
             }
         }
-        Local { gradient, hessian }
+        Derivatives { gradient, hessian }
     }
+}
+
+/// The gradients `∇u` and `∇v` of a map in each triangle, in the frame of the field of the angles given.
+pub fn gradients(metric: &Metric, angle: &[f64], uv: &[[DVec2; 3]]) -> Vec<[f64; 4]> {
+    let each = |(f, w): (usize, &[DVec2; 3])| matrix(&hats(metric, angle[f], FaceId::new(f)), w);
+    uv.iter().enumerate().map(each).collect()
+}
+
+fn matrix(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {
+    let u = hats[0] * w[0].x + hats[1] * w[1].x + hats[2] * w[2].x;
+    let v = hats[0] * w[0].y + hats[1] * w[1].y + hats[2] * w[2].y;
+    [u.x, u.y, v.x, v.y]
 }
 
 /// The first time at which a triangle becomes flat when all corners go from one map to another at constant speed.

@@ -16,15 +16,8 @@ use crate::param::Relation;
 /// Largest angle, in quarter turns, between a feature and the field along it: half of what would make it ambiguous.
 const SLANT: f64 = 0.25;
 
-/// All that is to be isolines, for the field of angles `angle`: what the layout demands, and features, those first that
-/// the field follows best.
-pub(super) fn relations(
-    net: &Net,
-    roads: &Crossroads,
-    metric: &Metric,
-    angle: &[f64],
-    sharp: &[bool],
-) -> (Vec<Relation>, Vec<Relation>) {
+/// What the layout demands to be isolines.
+pub(super) fn demanded(net: &Net, roads: &Crossroads) -> Vec<Relation> {
     let chain = |c: super::straight::Chain| Relation {
         from: corner(c.start),
         crossed: c.crossed,
@@ -33,17 +26,15 @@ pub(super) fn relations(
         difference: 0.0,
     };
     let mut relations: Vec<Relation> = roads.chains(net).into_iter().map(chain).collect();
-    let on_edge = |h: HalfedgeId, heading: i32| Relation {
-        from: corner(h),
-        crossed: Vec::new(),
-        to: corner(net.mesh.next(h)),
-        axis: across(heading),
-        difference: 0.0,
-    };
     let border = net.mesh.edges().map(|e| net.mesh.halfedge(e));
-    relations.extend(border.filter_map(|h| net.boundary.get(&h).map(|&(k, _)| on_edge(h, i32::from(k)))));
-    let features = features(net, metric, angle, sharp).into_iter().map(|(h, heading)| on_edge(h, heading)).collect();
-    (relations, features)
+    let bordering = border.filter_map(|h| net.boundary.get(&h).map(|&(k, _)| on_edge(net, (h, across(i32::from(k))))));
+    relations.extend(bordering);
+    relations
+}
+
+/// That an edge is an isoline of a coordinate.
+pub(super) fn on_edge(net: &Net, (h, axis): (HalfedgeId, u8)) -> Relation {
+    Relation { from: corner(h), crossed: Vec::new(), to: corner(net.mesh.next(h)), axis, difference: 0.0 }
 }
 
 /// The coordinate that is constant along a heading.
@@ -51,8 +42,9 @@ fn across(heading: i32) -> u8 {
     if heading % 2 == 0 { 1 } else { 0 }
 }
 
-/// The half-edges of features that can be isolines, with their headings.
-fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<(HalfedgeId, i32)> {
+/// The half-edges of features that can be isolines where the field has these angles, and of which coordinate; those first
+/// that the field follows best.
+pub(super) fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<(HalfedgeId, u8)> {
     let mesh = &net.mesh;
     let mut found: Vec<Option<(i32, f64)>> = vec![None; mesh.n_edges()];
     for e in mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e)) {
@@ -81,7 +73,7 @@ fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<(H
     let mut list: Vec<(f64, HalfedgeId, i32)> =
         mesh.edges().filter_map(|e| found[e.index()].map(|(k, off)| (off, mesh.halfedge(e), k))).collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    list.into_iter().map(|(_, h, k)| (h, k)).collect()
+    list.into_iter().map(|(_, h, k)| (h, across(k))).collect()
 }
 
 /// The heading along a side in its own triangle, from that of its edge's half-edge in that one's triangle.

@@ -15,7 +15,7 @@ use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
-use super::solver::{Aim, Solver, Start, State};
+use super::solver::{Aim, Features, Solver, Start, State};
 use super::spacing::{Spacing, lengths};
 use super::straight::{ArcEnd, Crossroads};
 use super::{EmbeddingError, voronoi};
@@ -34,13 +34,17 @@ const STEP: f64 = 0.75 * 2.0 / 3.0;
 /// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
 const LITTLE: f64 = 5e-4;
 const IDLE: usize = 2;
+/// Steps after which least squares are to have led to a map with few folds, and how many folds are few: from more on the
+/// map as a whole does not fit its constraints, and another start is quicker and finds one that does.
+const TRIAL: usize = 4;
+pub(super) const HOPELESS: usize = 50;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
 const ALIKE: f64 = 0.3;
 /// By what a step is then lengthened, and how far at most.
 const LONGER: f64 = 1.4;
 const LONGEST: f64 = 6.0;
 /// Steps of Newton's method from one place of the nodes to the next: the first few make up for the move.
-const NEWTON_STEPS: usize = 6;
+const NEWTON_STEPS: usize = 4;
 /// Rings of triangles around a node that has changed its vertex in which the field turns markedly with it.
 const TURNED_RINGS: usize = 2;
 
@@ -102,8 +106,8 @@ pub struct Optimizer<'a> {
     pub(super) sizes: Option<SpdSymbolic>,
     /// What maps are to be like that must not fold; `None` for those of least squares.
     pub(super) shape: Option<Shape>,
-    /// Whether features are to be isolines.
-    features: bool,
+    /// What is done about features.
+    pub(super) features: Features,
     pub(super) state: State,
     /// Factor of the steps of every node.
     pace: Vec<f64>,
@@ -137,14 +141,14 @@ impl<'a> Optimizer<'a> {
             surface.curvature[at.nearest_vertex(surface.mesh).index()]
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
-        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, true), progress)?.ok_or(EmbeddingError::Folded)
+        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, Features::Held), progress)?.ok_or(EmbeddingError::Folded)
     }
 
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
     pub(super) fn on(
         job: &Job<'a>,
         (net, sharp, curvature): (Net, Vec<bool>, Vec<PrincipalCurvature>),
-        (aim, features): (Aim<'_>, bool),
+        (aim, features): (Aim<'_>, Features),
         progress: &Progress,
     ) -> Result<Option<Self>, EmbeddingError> {
         let Job { surface, layout, settings, .. } = *job;
@@ -209,6 +213,11 @@ impl<'a> Optimizer<'a> {
     pub(super) fn release(&mut self, job: &Job<'_>) {
         let held = pinned(job);
         self.roads = Crossroads::new(job.layout, |i| held[i]);
+    }
+
+    /// Whether least squares lead nowhere: after some steps many triangles are still folded.
+    pub(super) fn is_hopeless(&self) -> bool {
+        self.shape.is_none() && self.steps >= TRIAL && self.state.flipped() > HOPELESS
     }
 
     /// The best so far.
@@ -391,7 +400,7 @@ impl<'a> Optimizer<'a> {
     }
 
     /// As [`Self::solve`], `None` where no map without folds was found.
-    fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
+    pub(super) fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
         let metric = Metric::new(&net.mesh);
         let State { metric: before, field, solution, .. } = &self.state;
         let uv = &solution.map.uv;

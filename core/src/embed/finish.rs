@@ -1,8 +1,8 @@
 //! The end of an optimisation: all nodes on their isolines, and no folds.
 
 use super::EmbeddingError;
-use super::descent::Optimizer;
-use super::solver::State;
+use super::descent::{HOPELESS, Optimizer};
+use super::solver::{Features, State};
 use crate::field::GuidedSystem;
 use crate::mesh::TriMesh;
 use crate::param::{Effort, Fold};
@@ -16,9 +16,6 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
-/// From more folds than this on the map as a whole does not fit its constraints: to look for one without folds from
-/// another start is quicker and finds it.
-const HOPELESS: usize = 50;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
 
@@ -49,6 +46,7 @@ impl Optimizer<'_> {
             self.round(edge, progress)?;
         }
         if self.shape.is_some() {
+            self.hold_features(progress)?;
             return Ok(Vec::new());
         }
         self.stiffen(progress)?;
@@ -66,6 +64,19 @@ impl Optimizer<'_> {
         solution.energy = unfolded.energy;
         solution.free = unfolded.y;
         Ok(unfolded.folds)
+    }
+
+    /// Makes features isolines that were pulled towards them, if a map without folds allows it.
+    fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        if self.features == Features::Held || !self.sharp.contains(&true) {
+            return Ok(());
+        }
+        self.features = Features::Held;
+        match self.attempt(self.state.net.clone(), progress)? {
+            Some(state) => self.state = state,
+            None => tracing::debug!("features are not isolines exactly"),
+        }
+        Ok(())
     }
 
     /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.

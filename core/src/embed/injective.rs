@@ -10,7 +10,7 @@ use super::EmbeddingError;
 use super::descent::{Optimizer, Surface};
 use super::net::Net;
 use super::pipeline::Job;
-use super::solver::{Aim, Start, State};
+use super::solver::{Aim, Features, Start, State};
 use crate::dual::{Mark, RefinedMesh};
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
@@ -89,7 +89,7 @@ impl<'a> Optimizer<'a> {
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
-        Self::on(job, (net, sharp, curvature), (aim, false), progress)
+        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled), progress)
     }
 
     /// Sets up an optimisation without folds that starts from where another has ended. `None` if that map folds.
@@ -103,7 +103,7 @@ impl<'a> Optimizer<'a> {
         progress: &Progress,
     ) -> Result<Option<Self>, EmbeddingError> {
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
-        Self::on(job, (state.net, sharp, curvature), (aim, true), progress)
+        Self::on(job, (state.net, sharp, curvature), (aim, Features::Held), progress)
     }
 }
 

@@ -175,6 +175,9 @@ pub fn optimise(
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<Embedded, EmbeddingError> {
     progress.report("Embedding the layout", 0.0);
+    if std::env::var("PL_NOLS").is_ok() {
+        return Course::new(job, watch).unfolded(job, Err(EmbeddingError::Folded), progress);
+    }
     let (mut optimizer, mut course) = match Optimizer::new(job, progress) {
         Ok(optimizer) => {
             let course = Course::begin(job, &optimizer, watch);
@@ -247,7 +250,7 @@ impl<'w> Course<'w> {
         (from, to): (f64, f64),
         progress: &Progress,
     ) -> Result<(), EmbeddingError> {
-        while self.next == Next::Continue && !optimizer.is_done() {
+        while self.next == Next::Continue && !optimizer.is_done() && !optimizer.is_hopeless() {
             progress.report("Moving nodes", from + (to - from) * optimizer.share_done());
             let better = optimizer.step(progress)?;
             self.steps += 1;
@@ -265,13 +268,18 @@ impl<'w> Course<'w> {
         mut optimizer: Optimizer<'_>,
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
+        let flipped_at_rest = optimizer.state().flipped();
+        if optimizer.is_hopeless() && !job.layout.patches.is_empty() && job.settings.integer.is_none() {
+            let mut done = self.unfolded(job, Err(EmbeddingError::Folded), progress)?;
+            done.report.flipped_at_rest = flipped_at_rest;
+            return Ok(done);
+        }
         if let Some(edge) = job.settings.integer {
             progress.report("Rounding lengths", 0.35);
             optimizer.round(edge, progress)?;
             self.show(&optimizer);
             self.rest(&mut optimizer, (0.35, 0.4), progress)?;
         }
-        let flipped_at_rest = optimizer.state().flipped();
         progress.report("Removing folds", 0.4);
         let found = optimizer.finish(progress).and_then(|folds| {
             let done = finished(job, optimizer.state(), &folds, self.area, progress)?;

@@ -12,9 +12,9 @@ use super::spacing::Spacing;
 use super::straight::Crossroads;
 use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
-use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{
-    Effort, Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients,
+    Effort, Injective, InjectiveEnergy, Objective, ParamError, Relation, SeamlessSystem, Shape, Solution, gradients,
 };
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
@@ -63,6 +63,15 @@ pub(super) enum Aim<'s> {
     },
 }
 
+/// What a map is to do about the features of the surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Features {
+    /// They are pulled towards isolines, in a map without folds.
+    Pulled,
+    /// They are isolines wherever nothing contradicts that.
+    Held,
+}
+
 /// Where a map without folds starts.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Start<'s> {
@@ -93,8 +102,8 @@ pub(super) struct Solver<'s> {
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
     pub settings: Settings,
-    /// Whether features are to be isolines.
-    pub features: bool,
+    /// What is done about features.
+    pub features: Features,
 }
 
 impl Solver<'_> {
@@ -122,13 +131,16 @@ impl Solver<'_> {
         let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
-        let system = self.build(&net, &metric, &field, &nodes)?;
+        let features = alignment::features(&net, &metric, &field.angle, self.sharp);
+        let pulled = if self.features == Features::Pulled { &features[..] } else { &[] };
+        let system = self.build(&net, &field, &nodes, &features)?;
         progress.check()?;
         let solution = match aim {
             Aim::LeastSquares => Some(system.solve(&metric, &field, &objective, progress)?),
             Aim::Injective { shape, start, steps } => {
+                let firmness = &firmness;
                 let setting =
-                    Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness: &firmness };
+                    Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness, pulled };
                 setting.injective(system, shape, start, steps, progress)?
             }
         };
@@ -139,14 +151,15 @@ impl Solver<'_> {
     fn build(
         &mut self,
         net: &Net,
-        metric: &Metric,
         field: &CrossField,
         nodes: &[VertexId],
+        features: &[(HalfedgeId, u8)],
     ) -> Result<&mut SeamlessSystem, EmbeddingError> {
-        let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
-        if !self.features {
-            features.clear();
-        }
+        let demanded = alignment::demanded(net, self.roads);
+        let mut features: Vec<Relation> = match self.features {
+            Features::Pulled => Vec::new(),
+            Features::Held => features.iter().map(|&f| alignment::on_edge(net, f)).collect(),
+        };
         let mut spacing = self.spacing.relations(net, self.roads);
         let mut system = self.seamless.take();
         loop {
@@ -231,6 +244,7 @@ struct Setting<'s> {
     field: &'s CrossField,
     objective: &'s Objective,
     firmness: &'s [f64],
+    pulled: &'s [(HalfedgeId, u8)],
 }
 
 impl Setting<'_> {
@@ -242,7 +256,7 @@ impl Setting<'_> {
         steps: usize,
         progress: &Progress,
     ) -> Result<Option<Solution>, EmbeddingError> {
-        let Self { net, metric, field, objective, firmness } = *self;
+        let Self { net, metric, field, objective, firmness, pulled } = *self;
         let wanted = match start {
             Start::Map(uv) => gradients(metric, &field.angle, uv),
             Start::Moved { uv, gradients: before, turned } => {
@@ -255,7 +269,7 @@ impl Setting<'_> {
         };
         let free = system.fit(metric, &field.angle, &wanted)?;
         progress.check()?;
-        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness));
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
         let mut found = system.injective(&energy, free.clone());
         let folds = energy.folds(&system.map(&free).uv);
         if found.is_none() && folds <= FEW {

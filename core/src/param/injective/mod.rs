@@ -37,8 +37,11 @@ const SUFFICIENT: f64 = 1e-4;
 /// Halvings of a step before it is given up.
 const HALVINGS: usize = 20;
 /// A step that gains less than this share of the energy is the last but for [`PATIENCE`] more.
-const GAIN: f64 = 1e-3;
+const GAIN: f64 = 2e-3;
 const PATIENCE: usize = 2;
+/// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
+/// much as twice the area of the triangles beside it.
+const PULL: f64 = 100.0;
 /// By what share the diagonal is raised: a semidefinite Hessian must become definite beyond rounding.
 const GROUND: f64 = 1e-9;
 
@@ -140,7 +143,9 @@ impl SeamlessSystem {
         let mut patience = PATIENCE;
         for step in 0..steps {
             progress.check()?;
+            let t0 = std::time::Instant::now();
             let (matrix, downhill) = self.newton_matrix(newton, energy, &at.map.uv);
+            let t1 = t0.elapsed().as_secs_f64();
             let solved = newton.symbolic.factor(&matrix).and_then(|f| f.solve(&matrix, &downhill));
             let direction = match solved {
                 Ok(direction) => direction,
@@ -148,12 +153,13 @@ impl SeamlessSystem {
                 Err(SolveError::Residual { .. } | SolveError::NotPositiveDefinite { .. }) => downhill.clone(),
                 Err(_) => return Ok(true),
             };
+            let t2 = t0.elapsed().as_secs_f64();
             let slope: f64 = direction.iter().zip(&downhill).map(|(a, b)| a * b).sum();
             let before = at.energy;
             if !self.search(energy, at, &direction, slope) {
                 return Ok(true);
             }
-            tracing::debug!(step, energy = at.energy, "map without folds");
+            tracing::debug!(step, energy = at.energy, n = matrix.n(), t1, t2, t3 = t0.elapsed().as_secs_f64(), "map without folds");
             if before - at.energy < GAIN * at.energy {
                 patience -= 1;
                 if patience == 0 {
@@ -229,6 +235,8 @@ pub struct InjectiveEnergy<'a> {
     objective: &'a Objective,
     shape: Shape,
     firmness: &'a [f64],
+    /// For each side of each triangle the coordinate that it is pulled towards an isoline of; empty: none.
+    pulled: Vec<[Option<u8>; 3]>,
 }
 
 impl<'a> InjectiveEnergy<'a> {
@@ -240,7 +248,27 @@ impl<'a> InjectiveEnergy<'a> {
         objective: &'a Objective,
         (shape, firmness): (Shape, &'a [f64]),
     ) -> Self {
-        Self { metric, angle, objective, shape, firmness }
+        Self { metric, angle, objective, shape, firmness, pulled: Vec::new() }
+    }
+
+    /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v).
+    pub fn pulling(mut self, list: &[(HalfedgeId, u8)]) -> Self {
+        if !list.is_empty() {
+            self.pulled = vec![[None; 3]; self.angle.len()];
+        }
+        for &(h, axis) in list {
+            self.pulled[h.index() / 3][h.index() % 3] = Some(axis);
+        }
+        self
+    }
+
+    /// The sides of a triangle that are pulled: their corners, the coordinate, and how much it differs between them.
+    fn pulls(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = (usize, usize, usize, f64)> {
+        let sides = self.pulled.get(f).copied().unwrap_or_default();
+        sides.into_iter().enumerate().filter_map(move |(i, axis)| {
+            let (k, j) = (usize::from(axis?), (i + 1) % 3);
+            Some((i, j, k, w[j][k] - w[i][k]))
+        })
     }
 
     fn hats(&self, f: usize) -> [DVec2; 3] {
@@ -256,7 +284,8 @@ impl<'a> InjectiveEnergy<'a> {
     pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
         let each = |(f, w): (usize, &[DVec2; 3])| {
             let area = self.metric.area(FaceId::new(f));
-            Some(area * self.density(f).value(&matrix(&self.hats(f), w))?)
+            let pull: f64 = self.pulls(f, w).map(|(.., d)| PULL * d * d).sum();
+            Some(area * self.density(f).value(&matrix(&self.hats(f), w))? + pull)
         };
         // Added up in order: the sum must not depend on threads.
         let parts: Vec<Option<f64>> = uv.par_iter().enumerate().map(each).collect();
@@ -282,6 +311,14 @@ impl<'a> InjectiveEnergy<'a> {
                 let along = |r: usize| bend[r][l] * other.x + bend[r][l + 1] * other.y;
                 hessian[entry] = area * (hat.x * along(k) + hat.y * along(k + 1));
                 entry += 1;
+            }
+        }
+        for (i, j, k, d) in self.pulls(f, w) {
+            let (p, q) = (3 * k + i, 3 * k + j);
+            gradient[p] -= 2.0 * PULL * d;
+            gradient[q] += 2.0 * PULL * d;
+            for (r, c, sign) in [(p, p, 1.0), (q, q, 1.0), (p.max(q), p.min(q), -1.0)] {
+                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * PULL;
             }
         }
         Derivatives { gradient, hessian }

@@ -9,7 +9,8 @@ use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay, write_all,
+    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay,
+    write_all,
 };
 
 use super::embed::summary;

@@ -103,6 +103,9 @@ pub enum EmbeddingError {
     /// The patches are not the rectangles the layout says.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
+    /// What is left without collapsed chords could not be drawn.
+    #[error(transparent)]
+    Redraw(#[from] crate::layout::RedrawError),
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

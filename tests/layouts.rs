@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use plait_core::dual::{Mark, RefinedMesh};
 use plait_core::embed::{
-    Embedded, Headings, Job, Net, Next, Optimizer, Settings, Snapshot, Surface, headings, optimise,
+    Embedded, Headings, Job, Net, Next, Optimizer, Settings, Surface, headings, optimise,
 };
 use plait_core::field::{Metric, indices};
 use plait_core::layout::{Arc, Embedding, Node, Patch, QuadLayout};
@@ -15,7 +15,7 @@ use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh};
 use plait_core::progress::Progress;
 use plait_core::quad::{refine, whole_counts};
 use plait_core::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
-use plait_core::weave::{Drawn, Goal, Options, PinnedParts, Script, Session, draw, replay};
+use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
 use support::{meshes, root};
 
 /// A weave script replayed; `None` where its mesh is missing.
@@ -154,16 +154,17 @@ fn the_map_does_not_depend_on_how_parts_are_numbered() {
 fn energy_falls_and_half_of_it_in_three_steps() {
     for name in ["cino_3holes", "pretzel"] {
         let Some((session, drawn)) = woven(name) else { return };
-        let mut seen: Vec<(usize, f64)> = Vec::new();
-        let mut watch = |s: &Snapshot| {
-            seen.push((s.step, s.energy));
-            Next::Continue
-        };
-        plait_core::weave::optimise(&session, &drawn, &PinnedParts::default(), &Progress::new(), &mut watch).unwrap();
-        assert!(seen.windows(2).all(|w| w[0].0 < w[1].0 && w[1].1 < w[0].1), "{name}: {seen:?}");
-        let (first, last) = (seen[0].1, seen[seen.len() - 1].1);
-        let third = seen.iter().filter(|s| s.0 <= 3).map(|s| s.1).fold(first, f64::min);
-        assert!(first - third > 0.5 * (first - last), "{name}: {seen:?}");
+        let headings = headings(&drawn.layout);
+        let mut optimizer = Optimizer::new(&job_of(&session, &drawn, &headings), &Progress::new()).unwrap();
+        let mut seen = vec![optimizer.state().solution.energy];
+        while !optimizer.is_done() {
+            let better = optimizer.step(&Progress::new()).unwrap();
+            let (before, now) = (seen[seen.len() - 1], optimizer.state().solution.energy);
+            assert!(if better { now < before } else { now == before }, "{name}: {before}, then {now}");
+            seen.push(now);
+        }
+        let (first, last) = (seen[0], seen[seen.len() - 1]);
+        assert!(first - seen[3] > 0.5 * (first - last), "{name}: {seen:?}");
     }
 }
 
@@ -183,7 +184,8 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     for _ in 0..3 {
         optimizer.step(&Progress::new()).unwrap();
     }
-    let (state, _) = optimizer.finish(&Progress::new()).unwrap();
+    optimizer.finish(&Progress::new()).unwrap();
+    let state = optimizer.state();
     let (mesh, map) = (&state.net.mesh, &state.solution.map);
     let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
     let mut edges = 0;
@@ -197,8 +199,8 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     assert!(edges > 100, "{edges}");
 }
 
-/// An icosahedron on a sphere, every triangle in three patches around its middle, on a mesh of `96 · 20 / 6 · 6` triangles:
-/// 12 nodes of valence 5 among 20 of valence 3.
+/// An icosahedron on a sphere, every triangle in three patches around its middle, on a mesh of 1920 triangles: 12 nodes of
+/// valence 5 among 20 of valence 3.
 fn icosahedron() -> (Stage, QuadLayout, Embedding) {
     let g = 0.5 * (1.0 + 5f64.sqrt());
     let mut points: Vec<DVec3> = Vec::new();
@@ -320,7 +322,6 @@ fn short_chords_are_collapsed() {
 fn strips_are_left_out_that_only_make_a_layout_irregular() {
     let (given, done) = embedded(Settings { simplify: true, ..Settings::default() });
     assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);
-    assert!(done.report.energy_after <= done.report.energy_before);
     assert_eq!(done.layout.chords, given.chords - done.report.collapsed.len());
 }
 

@@ -9,19 +9,19 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::cross::step_to_crossing;
-use super::gradient::descent;
+use super::gradient::{descent, injective_descent};
 use super::net::Net;
 use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
-use super::solver::{Solver, State};
+use super::solver::{Aim, Solver, Start, State};
 use super::spacing::{Spacing, lengths};
 use super::straight::{ArcEnd, Crossroads};
 use super::{EmbeddingError, voronoi};
 use crate::field::{GuidedSystem, Metric};
 use crate::mesh::{TriMesh, VertexId};
-use crate::param::{Fold, SeamlessSystem};
+use crate::param::{SeamlessSystem, Shape, gradients};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
@@ -30,20 +30,13 @@ use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
 /// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
 const STEP: f64 = 0.75 * 2.0 / 3.0;
 
-/// Rounds of stiffening; by what a folded triangle's weight grows in each, and up to what; over how many rings of
-/// triangles that fades out, and by what factor in each.
-const STIFFENINGS: usize = 15;
-const STIFFER: f64 = 1.5;
-const STIFFEST: f64 = 1e4;
-const FADING: usize = 5;
-const FADE: f64 = 0.7;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
 const ALIKE: f64 = 0.3;
 /// By what a step is then lengthened, and how far at most.
 const LONGER: f64 = 1.4;
 const LONGEST: f64 = 6.0;
-/// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
-const SETTLING: usize = 3;
+/// Steps of Newton's method from one place of the nodes to the next: the first few make up for the move.
+const NEWTON_STEPS: usize = 6;
 
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
@@ -98,9 +91,9 @@ impl Default for Settings {
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
     pub(super) ground: Ground<'a>,
-    settings: Settings,
-    curvature: Vec<PrincipalCurvature>,
-    sharp: Vec<bool>,
+    pub(super) settings: Settings,
+    pub(super) curvature: Vec<PrincipalCurvature>,
+    pub(super) sharp: Vec<bool>,
     pub(super) roads: Crossroads,
     /// Chords held at lengths, the chord of every arc, the least length and the fewest quads across every chord.
     pub(super) spacing: Spacing,
@@ -109,9 +102,13 @@ pub struct Optimizer<'a> {
     pub(super) fewest: Vec<u32>,
     /// The ends of arcs at each node.
     ends: Vec<Vec<ArcEnd>>,
-    guided: GuidedSystem,
-    seamless: Option<SeamlessSystem>,
-    sizes: Option<SpdSymbolic>,
+    pub(super) guided: GuidedSystem,
+    pub(super) seamless: Option<SeamlessSystem>,
+    pub(super) sizes: Option<SpdSymbolic>,
+    /// What maps are to be like that must not fold; `None` for those of least squares.
+    pub(super) shape: Option<Shape>,
+    /// Whether features are to be isolines.
+    features: bool,
     pub(super) state: State,
     /// Factor of the steps of every node.
     pace: Vec<f64>,
@@ -129,24 +126,12 @@ impl<'a> Optimizer<'a> {
     ///
     /// See [`EmbeddingError`].
     pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
-        let Job { surface, layout, settings, .. } = *job;
-        let mut held = job.pinned_nodes.to_vec();
-        held.resize(layout.nodes.len(), false);
-        for (arc, _) in layout.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {
-            arc.nodes.iter().for_each(|&n| held[n as usize] = true);
-        }
-        let pinned = |i: usize| held[i];
+        let Job { surface, layout, .. } = *job;
         let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
         progress.check()?;
         let sharp = sharp_edges(&surface, &net);
-        snap(&mut net, &sharp, pinned);
-        let roads = Crossroads::new(layout, pinned);
-        let mut ends = vec![Vec::new(); layout.nodes.len()];
-        for (a, arc) in (0..).zip(&layout.arcs) {
-            ends[arc.nodes[0] as usize].push((a, false));
-            ends[arc.nodes[1] as usize].push((a, true));
-        }
-        let ground = ground(&surface, &net, &sharp, pinned, settings);
+        let held = pinned(job);
+        snap(&mut net, &sharp, |i| held[i]);
         let nearest = |v: usize| {
             if v < surface.mesh.n_vertices() {
                 return surface.curvature[v];
@@ -155,8 +140,34 @@ impl<'a> Optimizer<'a> {
             surface.curvature[at.nearest_vertex(surface.mesh).index()]
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
+        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, true), progress)?.ok_or(EmbeddingError::Folded)
+    }
+
+    /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
+    pub(super) fn on(
+        job: &Job<'a>,
+        (net, sharp, curvature): (Net, Vec<bool>, Vec<PrincipalCurvature>),
+        (aim, features): (Aim<'_>, bool),
+        progress: &Progress,
+    ) -> Result<Option<Self>, EmbeddingError> {
+        let Job { surface, layout, settings, .. } = *job;
+        let held = pinned(job);
+        let mut roads = Crossroads::new(layout, |i| held[i]);
+        let shape = match aim {
+            Aim::LeastSquares => None,
+            Aim::Injective { shape, .. } => {
+                roads.hold_all();
+                Some(shape)
+            }
+        };
+        let mut ends = vec![Vec::new(); layout.nodes.len()];
+        for (a, arc) in (0..).zip(&layout.arcs) {
+            ends[arc.nodes[0] as usize].push((a, false));
+            ends[arc.nodes[1] as usize].push((a, true));
+        }
+        let ground = ground(&surface, &net, &sharp, |i| held[i], settings);
         let spacing = Spacing::none(layout.chords);
-        let least = settings.spacing * mean_edge(&net.mesh);
+        let least = settings.spacing * mean_edge(surface.mesh);
         let guided = GuidedSystem::new(&net.mesh)?;
         let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
@@ -168,10 +179,11 @@ impl<'a> Optimizer<'a> {
             seamless: None,
             sizes: None,
             settings,
+            features,
         };
-        let state = solver.solve(net, metric, None, progress)?;
+        let Some(state) = solver.solve(net, metric, None, aim, progress)? else { return Ok(None) };
         let (seamless, sizes) = (solver.seamless, solver.sizes);
-        Ok(Self {
+        Ok(Some(Self {
             ground,
             settings,
             curvature,
@@ -185,12 +197,20 @@ impl<'a> Optimizer<'a> {
             guided,
             seamless,
             sizes,
+            shape,
+            features,
             state,
             pace: vec![1.0; layout.nodes.len()],
             heading: vec![DVec3::ZERO; layout.nodes.len()],
             halved: 0,
             steps: 0,
-        })
+        }))
+    }
+
+    /// Lets regular nodes go where the isolines through them cross; see [`Self::finish`].
+    pub(super) fn release(&mut self, job: &Job<'_>) {
+        let held = pinned(job);
+        self.roads = Crossroads::new(job.layout, |i| held[i]);
     }
 
     /// The best so far.
@@ -236,16 +256,18 @@ impl<'a> Optimizer<'a> {
     pub fn step(&mut self, progress: &Progress) -> Result<bool, EmbeddingError> {
         self.steps += 1;
         let State { net, solution, .. } = &self.state;
-        let held = self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+        // A map without folds keeps chords from vanishing by itself.
+        let extend = |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+        let held = if self.shape.is_none() { extend(&mut self.spacing) } else { 0 };
         if held > 0 {
             tracing::debug!(held, "chords held apart");
             self.state = self.solve(self.state.net.clone(), progress)?;
         }
         let net = self.moved();
-        let next = self.solve(net, progress)?;
-        let better = next.solution.energy < self.state.solution.energy;
-        tracing::debug!(step = self.steps, energy = next.solution.energy, better, "nodes moved");
-        if better {
+        let next = self.attempt(net, progress)?.filter(|next| next.solution.energy < self.state.solution.energy);
+        let better = next.is_some();
+        tracing::debug!(step = self.steps, energy = next.as_ref().map(|n| n.solution.energy), "nodes moved");
+        if let Some(next) = next {
             self.state = next;
             self.halved = 0;
             self.adapt();
@@ -272,22 +294,34 @@ impl<'a> Optimizer<'a> {
 
     /// The direction in space in which a node is to move.
     fn heading_of(&self, i: usize) -> DVec3 {
-        let State { net, metric, field, objective, solution } = &self.state;
+        let State { net, metric, .. } = &self.state;
         let v = net.nodes[i].vertex;
         if !self.roads.held[i] || self.ground.hold[i] == Hold::Fixed {
             return DVec3::ZERO;
         }
-        let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
+        let d = self.downhill(v);
         if d.is_finite() { self.in_space(&net.mesh, metric, v, d).normalize_or_zero() } else { DVec3::ZERO }
+    }
+
+    /// The descent direction at a vertex, as a vector of its polar map.
+    fn downhill(&self, v: VertexId) -> DVec2 {
+        let State { net, metric, field, objective, solution } = &self.state;
+        let (mesh, angle, uv) = (&net.mesh, &field.angle, &solution.map.uv);
+        match self.shape {
+            // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
+            None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
+            // About its minimum the energy rises half as fast.
+            Some(shape) => {
+                injective_descent(mesh, metric, angle, uv, (objective, shape), v) / (0.25 * (1.0 + shape.anisotropy))
+            }
+        }
     }
 
     /// The net with every node moved by one step.
     fn moved(&self) -> Net {
-        let State { net, metric, field, objective, solution } = &self.state;
+        let State { net, metric, .. } = &self.state;
         let mut moved = net.clone();
         let cell = self.cells();
-        // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
-        let steep = 0.5 * (1.0 + self.settings.anisotropy);
         for (i, node) in net.nodes.iter().enumerate() {
             let v = node.vertex;
             if self.ground.hold[i] == Hold::Fixed {
@@ -297,8 +331,7 @@ impl<'a> Optimizer<'a> {
                 self.cross(&mut moved, i, &cell);
                 continue;
             }
-            let d = descent(&net.mesh, metric, &field.angle, &solution.map.uv, objective, v);
-            let step = d * (STEP * self.pace[i] / steep);
+            let step = self.downhill(v) * (STEP * self.pace[i]);
             if !(step.length() > 0.0 && step.is_finite()) {
                 continue;
             }
@@ -348,75 +381,28 @@ impl<'a> Optimizer<'a> {
         metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
     }
 
-    /// Ends the optimisation: brings regular nodes onto their isolines and holds them there, and removes folds. What is
-    /// returned besides the final state are the folds that remain.
+    /// Field and map of a net, with the field at hand as the one before.
     ///
     /// # Errors
     ///
-    /// See [`EmbeddingError`].
-    pub fn finish(mut self, progress: &Progress) -> Result<(State, Vec<Fold>), EmbeddingError> {
-        for _ in 0..SETTLING {
-            let net = self.settled();
-            self.state = self.solve(net, progress)?;
-        }
-        self.roads.hold_all();
-        loop {
-            self.state = self.solve(self.state.net.clone(), progress)?;
-            let State { net, solution, .. } = &self.state;
-            if self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
-                break;
-            }
-        }
-        if let Some(edge) = self.settings.integer {
-            self.round(edge, progress)?;
-        }
-        self.stiffen(progress)?;
-        let State { net, metric, field, objective, solution } = &mut self.state;
-        let Some(system) = &self.seamless else { return Ok((self.state, Vec::new())) };
-        objective.stiffness.clear();
-        let mut quarters = vec![4; net.mesh.n_vertices()];
-        for v in net.mesh.vertices().filter(|&v| net.mesh.is_boundary_vertex(v)) {
-            quarters[v.index()] = 0;
-        }
-        for n in net.nodes.iter().filter(|n| !n.boundary) {
-            quarters[n.vertex.index()] = n.valence as u32;
-        }
-        let unfolded = system.unfold(&net.mesh, metric, field, objective, (&solution.free, &quarters), progress)?;
-        tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
-        solution.map = system.map(&unfolded.y);
-        solution.energy = unfolded.energy;
-        solution.free = unfolded.y;
-        Ok((self.state, unfolded.folds))
-    }
-
-    /// Makes triangles at folds count more, and again, until none is left or it helps no more (Bommes, Zimmer and Kobbelt,
-    /// Mixed-Integer Quadrangulation, section 5.4): what that leaves is few and local.
-    fn stiffen(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        let Some(mut system) = self.seamless.take() else { return Ok(()) };
-        let mut weight = vec![1.0; self.state.net.mesh.n_faces()];
-        let mut work = self.state.clone();
-        let mut least = work.flipped();
-        for _ in 0..STIFFENINGS {
-            if least == 0 {
-                break;
-            }
-            raise(&work.net.mesh, &work.folded(), &mut weight);
-            work.objective.stiffness = weight.clone();
-            work.solution = system.solve(&work.metric, &work.field, &work.objective, progress)?;
-            let now = work.flipped();
-            tracing::debug!(folds = now, "stiffened");
-            if now < least {
-                least = now;
-                self.state = work.clone();
-            }
-        }
-        self.seamless = Some(system);
-        Ok(())
-    }
-
-    /// Field and map of a net, with the field at hand as the one before.
+    /// See [`EmbeddingError`]; [`EmbeddingError::Folded`] if there is to be a map without folds and none was found.
     pub(super) fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
+        self.attempt(net, progress)?.ok_or(EmbeddingError::Folded)
+    }
+
+    /// As [`Self::solve`], `None` where no map without folds was found.
+    fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
         let metric = Metric::new(&net.mesh);
+        let State { metric: before, field, solution, .. } = &self.state;
+        let same_faces = net.mesh.n_faces() == field.angle.len();
+        let list = if self.shape.is_some() && same_faces {
+            gradients(before, &field.angle, &solution.map.uv)
+        } else {
+            Vec::new()
+        };
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| {
+            Aim::Injective { shape, start: Start::Gradients(&list), steps: NEWTON_STEPS }
+        });
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
@@ -426,14 +412,15 @@ impl<'a> Optimizer<'a> {
             seamless: self.seamless.take(),
             sizes: self.sizes.take(),
             settings: self.settings,
+            features: self.features,
         };
-        let next = solver.solve(net, metric, Some(&self.state.field.angle), progress);
+        let next = solver.solve(net, metric, Some(&self.state.field.angle), aim, progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);
         next
     }
 
     /// The net with regular nodes, and only these, brought to the crossings of their isolines.
-    fn settled(&self) -> Net {
+    pub(super) fn settled(&self) -> Net {
         let mut moved = self.state.net.clone();
         let cell = self.cells();
         for i in 0..moved.nodes.len() {
@@ -450,18 +437,12 @@ impl<'a> Optimizer<'a> {
     }
 }
 
-/// Raises the weights of folded triangles, less in the rings around them.
-fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
-    let mut share: Vec<f64> = folded.iter().map(|&f| if f { 1.0 } else { 0.0 }).collect();
-    for _ in 0..FADING {
-        let wider = |f: crate::mesh::FaceId| {
-            let sides = mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h));
-            let around = sides.map(|t| share[t.index() / 3]).fold(0.0, f64::max);
-            share[f.index()].max(FADE * around)
-        };
-        share = mesh.faces().map(wider).collect();
+/// For each node whether it is pinned, itself or as the end of an arc.
+fn pinned(job: &Job<'_>) -> Vec<bool> {
+    let mut held = job.pinned_nodes.to_vec();
+    held.resize(job.layout.nodes.len(), false);
+    for (arc, _) in job.layout.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {
+        arc.nodes.iter().for_each(|&n| held[n as usize] = true);
     }
-    for (w, s) in weight.iter_mut().zip(share) {
-        *w = (*w * (1.0 + STIFFER * s)).min(STIFFEST);
-    }
+    held
 }

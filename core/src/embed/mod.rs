@@ -12,8 +12,10 @@ mod collapse;
 mod cross;
 mod descent;
 mod emerge;
+mod finish;
 mod gradient;
 mod guides;
+mod injective;
 mod integer;
 mod lift;
 mod march;
@@ -21,6 +23,7 @@ mod measures;
 mod net;
 mod patches;
 mod pipeline;
+mod refine;
 mod relocate;
 mod rose;
 mod setup;
@@ -57,6 +60,7 @@ pub use trace::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
 use thiserror::Error;
 
 use crate::field::FieldError;
+use crate::layout::PatchError;
 use crate::mesh::{EdgeId, TriMeshError, VertexId};
 use crate::param::ParamError;
 use crate::progress::Cancelled;
@@ -94,6 +98,9 @@ pub enum EmbeddingError {
     /// The mesh with the nodes inserted is not a manifold.
     #[error("the layout's nodes do not fit into the mesh: {0}")]
     Mesh(#[from] TriMeshError),
+    /// No map without folds was found.
+    #[error("no map without folds was found")]
+    Folded,
     /// The arcs could not be traced in the map.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -106,6 +113,9 @@ pub enum EmbeddingError {
     /// What is left without collapsed chords could not be drawn.
     #[error(transparent)]
     Redraw(#[from] crate::layout::RedrawError),
+    /// The patches of the drawing could not be mapped.
+    #[error(transparent)]
+    Patch(#[from] PatchError),
     /// A linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

@@ -129,6 +129,16 @@ impl Net {
         Ok(Self { mesh, base_face, jump, angle, nodes, arcs, boundary })
     }
 
+    /// For each vertex the angle around it in a map, in quarter turns; 0 on the boundary, where it is open.
+    pub(super) fn quarters(&self) -> Vec<u32> {
+        let mesh = &self.mesh;
+        let mut quarters: Vec<u32> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { 0 } else { 4 }).collect();
+        for n in self.nodes.iter().filter(|n| !n.boundary) {
+            quarters[n.vertex.index()] = n.valence as u32;
+        }
+        quarters
+    }
+
     /// The period jump from the triangle of `h` to that of its twin.
     #[inline]
     pub fn jump_across(&self, h: HalfedgeId) -> i32 {

@@ -130,6 +130,12 @@ impl State {
         errors.iter().enumerate().map(folded).collect()
     }
 
+    /// The energy of least squares of the map.
+    fn least_squares(&self) -> f64 {
+        let each = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
+        each.iter().map(|r| r.energy).sum()
+    }
+
     fn chains(&self) -> Vec<ArcChain<'_>> {
         let chain = |a: &'_ super::NetArc| (a.start, a.end, a.heading);
         self.net
@@ -169,9 +175,14 @@ pub fn optimise(
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<Embedded, EmbeddingError> {
     progress.report("Embedding the layout", 0.0);
-    let mut optimizer = Optimizer::new(job, progress)?;
-    let mut course = Course::begin(job, &optimizer, watch);
-    course.rest(&mut optimizer, progress)?;
+    let (mut optimizer, mut course) = match Optimizer::new(job, progress) {
+        Ok(optimizer) => {
+            let course = Course::begin(job, &optimizer, watch);
+            (optimizer, course)
+        }
+        Err(error) => return Course::new(job, watch).unfolded(job, Err(error), progress),
+    };
+    course.rest(&mut optimizer, MOVING, progress)?;
     let Settings { collapse, simplify, .. } = job.settings;
     if job.layout.patches.is_empty() || (collapse.is_none() && !simplify) {
         return course.finish(job, optimizer, progress);
@@ -195,7 +206,7 @@ pub fn optimise(
                 Ok(redrawn) => {
                     shorter = Shorter::new(job, redrawn);
                     optimizer = Optimizer::new(&shorter.job(job), progress)?;
-                    course.rest(&mut optimizer, progress)?;
+                    course.rest(&mut optimizer, MOVING, progress)?;
                     let energy = optimizer.state().solution.energy;
                     tracing::debug!(gone = chosen.done.len(), energy, most, "chords collapsed");
                     (energy > most)
@@ -212,7 +223,7 @@ pub fn optimise(
                     _ => Shorter::new(job, chosen.draw(job, progress)?),
                 };
                 optimizer = Optimizer::new(&shorter.job(job), progress)?;
-                course.rest(&mut optimizer, progress)?;
+                course.rest(&mut optimizer, MOVING, progress)?;
             } else {
                 course.show(&optimizer);
             }
@@ -223,6 +234,9 @@ pub fn optimise(
     done.drawing = shorter.redrawn.map(|r| r.embedding);
     Ok(done)
 }
+
+/// From where to where moving nodes brings the progress of the whole.
+const MOVING: (f64, f64) = (0.05, 0.35);
 
 /// By what factor the energy may grow when arcs are collapsed that are shorter than was asked for.
 const WORSE: f64 = 1.5;
@@ -251,22 +265,32 @@ struct Course<'w> {
 }
 
 impl<'w> Course<'w> {
-    fn begin(job: &Job<'_>, optimizer: &Optimizer<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+    fn new(job: &Job<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
         let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
-        let energy_before = optimizer.state().solution.energy / area;
-        let flipped_before = optimizer.state().flipped();
-        let next = watch(&optimizer.state().snapshot(0));
-        Self { watch, next, steps: 0, area, energy_before, flipped_before }
+        Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0 }
+    }
+
+    fn begin(job: &Job<'_>, optimizer: &Optimizer<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+        let mut course = Self::new(job, watch);
+        course.energy_before = optimizer.state().solution.energy / course.area;
+        course.flipped_before = optimizer.state().flipped();
+        course.show(optimizer);
+        course
     }
 
     fn show(&mut self, optimizer: &Optimizer<'_>) {
         self.next = (self.watch)(&optimizer.state().snapshot(self.steps));
     }
 
-    /// Moves the nodes until they rest.
-    fn rest(&mut self, optimizer: &mut Optimizer<'_>, progress: &Progress) -> Result<(), EmbeddingError> {
+    /// Moves the nodes until they rest, which is a part of the whole work.
+    fn rest(
+        &mut self,
+        optimizer: &mut Optimizer<'_>,
+        (from, to): (f64, f64),
+        progress: &Progress,
+    ) -> Result<(), EmbeddingError> {
         while self.next == Next::Continue && !optimizer.is_done() {
-            progress.report("Moving nodes", 0.05 + 0.75 * optimizer.share_done());
+            progress.report("Moving nodes", from + (to - from) * optimizer.share_done());
             let better = optimizer.step(progress)?;
             self.steps += 1;
             if better {
@@ -284,19 +308,79 @@ impl<'w> Course<'w> {
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
         if let Some(edge) = job.settings.integer {
-            progress.report("Rounding lengths", 0.8);
+            progress.report("Rounding lengths", 0.35);
             optimizer.round(edge, progress)?;
             self.show(&optimizer);
-            self.rest(&mut optimizer, progress)?;
+            self.rest(&mut optimizer, (0.35, 0.4), progress)?;
         }
         let flipped_at_rest = optimizer.state().flipped();
-        progress.report("Removing folds", 0.8);
-        let (state, folds) = optimizer.finish(progress)?;
-        let mut done = finished(job, &state, &folds, self.area, progress)?;
-        let before = (self.steps, self.energy_before, self.flipped_before, flipped_at_rest);
-        let report = &mut done.report;
-        (report.steps, report.energy_before, report.flipped_before, report.flipped_at_rest) = before;
+        progress.report("Removing folds", 0.4);
+        let found = optimizer.finish(progress).and_then(|folds| {
+            let done = finished(job, optimizer.state(), &folds, self.area, progress)?;
+            Ok((done, optimizer))
+        });
+        let mut done = self.unfolded(job, found, progress)?;
+        done.report.flipped_at_rest = flipped_at_rest;
         Ok(done)
+    }
+
+    /// From what least squares have led to, if anything, to the embedding without folds.
+    fn unfolded(
+        mut self,
+        job: &Job<'_>,
+        found: Result<(Embedded, Optimizer<'_>), EmbeddingError>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let complete = !job.layout.patches.is_empty();
+        let mut done = match found {
+            Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Ok((done, _)) if !complete => done,
+            // Nodes that move on would leave the grid.
+            Ok((done, _)) if job.settings.integer.is_some() && done.report.folds.is_empty() => done,
+            Ok((done, optimizer)) if done.report.folds.is_empty() => {
+                let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
+                self.without_folds(job, start, progress).or_else(|error| match error {
+                    EmbeddingError::Cancelled(_) => Err(error),
+                    _ => Ok(done),
+                })?
+            }
+            found => {
+                let start = Optimizer::from_drawing(job, progress);
+                self.without_folds(job, start, progress).or_else(|error| match error {
+                    EmbeddingError::Cancelled(_) => Err(error),
+                    _ => Ok(found?.0),
+                })?
+            }
+        };
+        let report = &mut done.report;
+        (report.steps, report.energy_before, report.flipped_before) =
+            (self.steps, self.energy_before, self.flipped_before);
+        Ok(done)
+    }
+
+    /// Moves the nodes with a map that never folds.
+    fn without_folds(
+        &mut self,
+        job: &Job<'_>,
+        start: Result<Option<Optimizer<'_>>, EmbeddingError>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let mut optimizer = start?.ok_or(EmbeddingError::Folded)?;
+        self.show(&optimizer);
+        let safe = optimizer.state().clone();
+        optimizer.release(job);
+        self.rest(&mut optimizer, (0.5, 0.85), progress)?;
+        progress.report("Moving nodes", 0.85);
+        let moved = optimizer.finish(progress).and_then(|folds| {
+            finished(job, optimizer.state(), &folds, self.area, progress)
+        });
+        match moved {
+            Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
+                tracing::debug!(%error, "nodes stay where they were");
+                finished(job, &safe, &[], self.area, progress)
+            }
+            done => done,
+        }
     }
 }
 
@@ -385,7 +469,7 @@ fn finished(
     let report = EmbeddingReport {
         steps: 0,
         energy_before: 0.0,
-        energy_after: state.solution.energy / area,
+        energy_after: state.least_squares() / area,
         flipped_before: 0,
         flipped_at_rest: 0,
         folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),

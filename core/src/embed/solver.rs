@@ -2,6 +2,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use glam::DVec2;
+
 use super::descent::Settings;
 use super::guides::{feature_guides, shape_guides};
 use super::net::Net;
@@ -11,7 +13,9 @@ use super::straight::Crossroads;
 use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::mesh::VertexId;
-use crate::param::{Objective, ParamError, SeamlessSystem, Solution};
+use crate::param::{
+    Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients,
+};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::PrincipalCurvature;
@@ -41,6 +45,34 @@ pub struct State {
     pub solution: Solution,
 }
 
+/// What map a net is solved for.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Aim<'s> {
+    /// That of least squares.
+    LeastSquares,
+    /// One without folds.
+    Injective {
+        /// What it is to be like.
+        shape: Shape,
+        /// Where it starts.
+        start: Start<'s>,
+        /// Steps of Newton's method at most.
+        steps: usize,
+    },
+}
+
+/// Where a map without folds starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Start<'s> {
+    /// From a map without folds: the coordinates of the corners of each triangle.
+    Map(&'s [[DVec2; 3]]),
+    /// From a map nearby: the gradients of each triangle in the frame of the field.
+    Gradients(&'s [[f64; 4]]),
+}
+
+/// Up to how many folds of the first guess of a map are worth removing one by one.
+const FEW: usize = 200;
+
 /// What field and map are solved with.
 pub(super) struct Solver<'s> {
     pub curvature: &'s [PrincipalCurvature],
@@ -51,17 +83,21 @@ pub(super) struct Solver<'s> {
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
     pub settings: Settings,
+    /// Whether features are to be isolines.
+    pub features: bool,
 }
 
 impl Solver<'_> {
-    /// Solves for field and map of a net; with the angles of a field before, guides follow those.
+    /// Solves for field and map of a net; with the angles of a field before, guides follow those. `None` if there is to be
+    /// a map without folds and none was found.
     pub(super) fn solve(
         &mut self,
         net: Net,
         metric: Metric,
         previous: Option<&[f64]>,
+        aim: Aim<'_>,
         progress: &Progress,
-    ) -> Result<State, EmbeddingError> {
+    ) -> Result<Option<State>, EmbeddingError> {
         let mesh = &net.mesh;
         let angle = self.angles(&net, &metric, previous, progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
@@ -77,8 +113,14 @@ impl Solver<'_> {
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let system = self.build(&net, &metric, &field, &nodes)?;
         progress.check()?;
-        let solution = system.solve(&metric, &field, &objective, progress)?;
-        Ok(State { net, metric, field, objective, solution })
+        let solution = match aim {
+            Aim::LeastSquares => Some(system.solve(&metric, &field, &objective, progress)?),
+            Aim::Injective { shape, start, steps } => {
+                let setting = Setting { net: &net, metric: &metric, field: &field, objective: &objective };
+                setting.injective(system, shape, start, steps, progress)?
+            }
+        };
+        Ok(solution.map(|solution| State { net, metric, field, objective, solution }))
     }
 
     /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
@@ -90,6 +132,9 @@ impl Solver<'_> {
         nodes: &[VertexId],
     ) -> Result<&mut SeamlessSystem, EmbeddingError> {
         let (demanded, mut features) = alignment::relations(net, self.roads, metric, &field.angle, self.sharp);
+        if !self.features {
+            features.clear();
+        }
         let mut spacing = self.spacing.relations(net, self.roads);
         let mut system = self.seamless.take();
         loop {
@@ -164,6 +209,48 @@ impl Solver<'_> {
             }
         }
         guides
+    }
+}
+
+/// All that a map depends on besides its system.
+struct Setting<'s> {
+    net: &'s Net,
+    metric: &'s Metric,
+    field: &'s CrossField,
+    objective: &'s Objective,
+}
+
+impl Setting<'_> {
+    fn injective(
+        &self,
+        system: &mut SeamlessSystem,
+        shape: Shape,
+        start: Start<'_>,
+        steps: usize,
+        progress: &Progress,
+    ) -> Result<Option<Solution>, EmbeddingError> {
+        let Self { net, metric, field, objective } = *self;
+        let free = match start {
+            Start::Map(uv) => system.fit(metric, &field.angle, &gradients(metric, &field.angle, uv))?,
+            Start::Gradients(list) => system.fit(metric, &field.angle, list)?,
+        };
+        progress.check()?;
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, shape);
+        let mut found = system.injective(&energy, free.clone());
+        let folds = energy.folds(&system.map(&free).uv);
+        if found.is_none() && folds <= FEW {
+            let quarters = net.quarters();
+            let unfolded = system.unfold(&net.mesh, metric, field, objective, (&free, &quarters), progress)?;
+            tracing::debug!(folds, left = unfolded.folds.len(), "folds of the first guess");
+            found = system.injective(&energy, unfolded.y);
+        }
+        let Some(mut at) = found else {
+            tracing::debug!(folds, "the first guess folds");
+            return Ok(None);
+        };
+        system.descend(&system.newton()?, &energy, &mut at, steps, progress)?;
+        let Injective { map, free, energy } = at;
+        Ok(Some(Solution { map, free, energy }))
     }
 }
 

@@ -52,6 +52,25 @@ impl Scatter {
         out.finish(reduction.n_free())
     }
 
+    /// For the triangles' whole shares: the lower triangle, row by row, of u and then v of the corners.
+    pub fn of_whole_triangles(cut: &Cut, reduction: &Reduction) -> Self {
+        let n_faces = cut.turn.len();
+        let mut out = Collector::new(23 * n_faces);
+        for f in 0..n_faces {
+            let coordinates = [0, 1, 2, 3, 4, 5].map(|k| {
+                let (variable, sign) = constraints::corner(cut, HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
+                (reduction.expression(variable as usize).0, sign)
+            });
+            let pairs = (0..6).flat_map(|i| (0..=i).map(move |j| (i, j)));
+            for (entry, (i, j)) in (0..).zip(pairs) {
+                let ((row, s), (column, t)) = (coordinates[i], coordinates[j]);
+                out.expand(entry, row, column, i == j, s * t);
+            }
+            out.close();
+        }
+        out.finish(reduction.n_free())
+    }
+
     /// For the single entries of a matrix, of which each variable is expressed by `reduction`.
     pub fn of_matrix(matrix: &SparseHermitian<f64>, reduction: &Reduction) -> Self {
         let mut out = Collector::new(5 * matrix.n());

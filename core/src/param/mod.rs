@@ -6,6 +6,7 @@
 mod assembly;
 mod constraints;
 mod cut;
+mod injective;
 mod objective;
 mod seamless;
 mod solve;
@@ -16,6 +17,8 @@ mod unfold;
 use thiserror::Error;
 
 pub use cut::{Cut, CutPath};
+pub(crate) use injective::Density;
+pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, gradients};
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};

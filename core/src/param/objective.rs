@@ -82,7 +82,7 @@ impl Objective {
 }
 
 /// The gradients of the corners' hat functions, as parts along directions 0 and 1 of the field.
-fn hats(metric: &Metric, angle: f64, f: FaceId) -> [DVec2; 3] {
+pub(super) fn hats(metric: &Metric, angle: f64, f: FaceId) -> [DVec2; 3] {
     let [a, b, c] = *metric.layout(f);
     let axis = DVec2::from_angle(angle);
     let double = (b - a).perp_dot(c - a);

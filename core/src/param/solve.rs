@@ -11,7 +11,7 @@ use glam::DVec2;
 use super::assembly::Scatter;
 use super::constraints;
 use super::cut::Cut;
-use super::objective::{Objective, residuals};
+use super::objective::{Local, Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
 use super::unfold::{OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
@@ -65,23 +65,15 @@ impl Coordinate<'_> {
     }
 }
 
-/// A solved map, and the linear system it solves.
+/// A solved map.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The map, in the frames of the field.
     pub map: SeamlessMap,
     /// The free variables.
     pub free: Vec<f64>,
-    /// The energy of each triangle, without stiffness.
-    pub face_energy: Vec<f64>,
-    /// Their sum.
+    /// Its energy: of least squares without stiffness, or of maps without folds.
     pub energy: f64,
-    /// The matrix `H` of the free variables `y`: with stiffness the objective is `y' H y − 2 b y` and a constant.
-    pub matrix: SparseHermitian<f64>,
-    /// The right-hand side `b`.
-    pub rhs: Vec<f64>,
-    /// The factor of the matrix.
-    pub factor: SpdFactor<f64>,
 }
 
 impl SeamlessSystem {
@@ -192,10 +184,15 @@ impl SeamlessSystem {
         if let Some(e) = (0..self.jump.len()).find(|&e| self.jump[e] != field.jump[e].rem_euclid(4) as u8) {
             return Err(ParamError::OtherJump { edge: EdgeId::new(e) });
         }
+        Ok(self.assemble_with(|f| objective.local(metric, field.angle[f.index()], f)))
+    }
+
+    /// The matrix and the right-hand side of what each triangle contributes.
+    pub(super) fn assemble_with(&self, local: impl Fn(FaceId) -> Local) -> (SparseHermitian<f64>, Vec<f64>) {
         let mut open = self.shares.zero.clone();
         let mut load = vec![0.0; self.seams.n_free()];
-        for f in 0..n_faces {
-            let local = objective.local(metric, field.angle[f], FaceId::new(f));
+        for f in 0..self.cut.turn.len() {
+            let local = local(FaceId::new(f));
             self.shares.add(f, local.stiffness.as_flattened(), &mut open);
             for (axis, shares) in (0..).zip(local.load) {
                 for (i, share) in shares.into_iter().enumerate() {
@@ -206,7 +203,17 @@ impl SeamlessSystem {
                 }
             }
         }
-        Ok(self.tied.fold(&open, load))
+        self.tied.fold(&open, load)
+    }
+
+    /// What the seams leave of all variables.
+    pub(super) fn seams(&self) -> &Reduction {
+        &self.seams
+    }
+
+    /// What the relations leave of what the seams leave.
+    pub(super) fn ties(&self) -> &Reduction {
+        &self.tied.ties
     }
 
     /// Factors a matrix of this system; the first time its pattern is analysed.
@@ -222,7 +229,8 @@ impl SeamlessSystem {
         Ok(self.symbolic.insert(symbolic).factor(matrix)?)
     }
 
-    /// The map of least objective along `field`.
+    /// The map of least objective along `field`: the free variables `y` that minimise `y' H y − 2 b y` with the matrix
+    /// and right-hand side of [`Self::assemble`].
     ///
     /// # Errors
     ///
@@ -240,10 +248,8 @@ impl SeamlessSystem {
         progress.check()?;
         let free = factor.solve(&matrix, &rhs)?;
         let map = self.map(&free);
-        let each = residuals(metric, &field.angle, &map.uv, objective);
-        let face_energy: Vec<f64> = each.iter().map(|r| r.energy).collect();
-        let energy = face_energy.iter().sum();
-        Ok(Solution { map, free, face_energy, energy, matrix, rhs, factor })
+        let energy = residuals(metric, &field.angle, &map.uv, objective).iter().map(|r| r.energy).sum();
+        Ok(Solution { map, free, energy })
     }
 
     /// Removes the folds of the map with free variables `y`; see [`unfold`](super::unfold). `quarters` tells the angle

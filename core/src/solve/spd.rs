@@ -90,6 +90,18 @@ pub struct SparseHermitian<T> {
     value: Vec<T>,
 }
 
+impl SparseHermitian<f64> {
+    /// Makes every stored entry of the diagonal larger by a share of its own.
+    pub fn raise_diagonal(&mut self, share: f64) {
+        for c in 0..self.n() {
+            let first = self.col_start[c] as usize;
+            if first < self.col_start[c + 1] as usize && self.row[first] as usize == c {
+                self.value[first] *= 1.0 + share;
+            }
+        }
+    }
+}
+
 impl<T: Scalar> SparseHermitian<T> {
     /// Sums `triplets` (row, column, value) into an `n` by `n` matrix. An entry above the diagonal is mirrored, so
     /// each pair of off-diagonal entries is to be given once. The order of summation is that of the triplets.

@@ -1,0 +1,121 @@
+//! The end of an optimisation: all nodes on their isolines, and no folds.
+
+use super::EmbeddingError;
+use super::descent::Optimizer;
+use super::solver::State;
+use crate::field::GuidedSystem;
+use crate::mesh::TriMesh;
+use crate::param::Fold;
+use crate::progress::Progress;
+use crate::surface::PrincipalCurvature;
+
+/// Rounds of stiffening; by what a folded triangle's weight grows in each, and up to what; over how many rings of
+/// triangles that fades out, and by what factor in each.
+const STIFFENINGS: usize = 15;
+const STIFFER: f64 = 1.5;
+const STIFFEST: f64 = 1e4;
+const FADING: usize = 5;
+const FADE: f64 = 0.7;
+/// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
+const SETTLING: usize = 3;
+
+impl Optimizer<'_> {
+    /// Ends the optimisation: brings regular nodes onto their isolines and holds them there, and removes folds. Returned
+    /// are the folds that remain.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
+        for _ in 0..SETTLING {
+            let net = self.settled();
+            self.state = self.solve(net, progress)?;
+        }
+        if self.shape.is_none() {
+            self.refine(progress)?;
+        }
+        self.roads.hold_all();
+        loop {
+            self.state = self.solve(self.state.net.clone(), progress)?;
+            let State { net, solution, .. } = &self.state;
+            if self.shape.is_some() || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
+                break;
+            }
+        }
+        if let Some(edge) = self.settings.integer {
+            self.round(edge, progress)?;
+        }
+        if self.shape.is_some() {
+            return Ok(Vec::new());
+        }
+        self.stiffen(progress)?;
+        let State { net, metric, field, objective, solution } = &mut self.state;
+        let Some(system) = &self.seamless else { return Ok(Vec::new()) };
+        objective.stiffness.clear();
+        let quarters = net.quarters();
+        let unfolded = system.unfold(&net.mesh, metric, field, objective, (&solution.free, &quarters), progress)?;
+        tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
+        solution.map = system.map(&unfolded.y);
+        solution.energy = unfolded.energy;
+        solution.free = unfolded.y;
+        Ok(unfolded.folds)
+    }
+
+    /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.
+    pub(super) fn into_parts(self) -> (State, Vec<bool>, Vec<PrincipalCurvature>) {
+        (self.state, self.sharp, self.curvature)
+    }
+
+    /// Makes the triangles around irregular nodes finer.
+    fn refine(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        let State { net, field, .. } = &self.state;
+        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else { return Ok(()) };
+        self.guided = GuidedSystem::new(&net.mesh)?;
+        (self.seamless, self.sizes) = (None, None);
+        (self.sharp, self.curvature) = (carried.sharp, carried.at_vertex);
+        self.state.field.angle = net.angle.clone();
+        self.state = self.solve(net, progress)?;
+        Ok(())
+    }
+
+    /// Makes triangles at folds count more, and again, until none is left or it helps no more (Bommes, Zimmer and Kobbelt,
+    /// Mixed-Integer Quadrangulation, section 5.4): what that leaves is few and local.
+    fn stiffen(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        let Some(mut system) = self.seamless.take() else { return Ok(()) };
+        let mut weight = vec![1.0; self.state.net.mesh.n_faces()];
+        let mut work = self.state.clone();
+        let mut least = work.flipped();
+        for _ in 0..STIFFENINGS {
+            if least == 0 {
+                break;
+            }
+            raise(&work.net.mesh, &work.folded(), &mut weight);
+            work.objective.stiffness = weight.clone();
+            work.solution = system.solve(&work.metric, &work.field, &work.objective, progress)?;
+            let now = work.flipped();
+            tracing::debug!(folds = now, "stiffened");
+            if now < least {
+                least = now;
+                self.state = work.clone();
+            }
+        }
+        self.seamless = Some(system);
+        Ok(())
+    }
+}
+
+/// Raises the weights of folded triangles, less in the rings around them.
+fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
+    let mut share: Vec<f64> = folded.iter().map(|&f| if f { 1.0 } else { 0.0 }).collect();
+    for _ in 0..FADING {
+        let wider = |f: crate::mesh::FaceId| {
+            let sides = mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h));
+            let around = sides.map(|t| share[t.index() / 3]).fold(0.0, f64::max);
+            share[f.index()].max(FADE * around)
+        };
+        share = mesh.faces().map(wider).collect();
+    }
+    for (w, s) in weight.iter_mut().zip(share) {
+        *w = (*w * (1.0 + STIFFER * s)).min(STIFFEST);
+    }
+}

@@ -1,0 +1,178 @@
+//! The energy of a triangle per area, as a function of the matrix of its map.
+
+use super::Shape;
+
+/// What the energy depends on besides the matrix.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Density {
+    /// `ρ`.
+    anisotropy: f64,
+    /// `λ`.
+    size: f64,
+    /// The determinant wanted, `m`.
+    determinant: f64,
+}
+
+/// Sweeps of the Jacobi method: of 4 by 4 matrices it has converged to rounding after five.
+const SWEEPS: usize = 6;
+
+impl Density {
+    /// The energy of a triangle in which the gradients are to have the lengths given.
+    pub(crate) fn new(shape: Shape, [a, b]: [f64; 2]) -> Self {
+        Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b }
+    }
+
+    fn weights(&self) -> [f64; 4] {
+        [1.0, self.anisotropy, self.anisotropy, 1.0]
+    }
+
+    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive.
+    pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
+        let det = j[0] * j[3] - j[1] * j[2];
+        let ratio = det / self.determinant;
+        let e = 0.5 * (self.norm(j) / det + self.size * (ratio + 1.0 / ratio));
+        (det > 0.0 && e.is_finite()).then_some(e)
+    }
+
+    /// `jᵀ W j`.
+    fn norm(&self, j: &[f64; 4]) -> f64 {
+        self.weights().iter().zip(j).map(|(w, x)| w * x * x).sum()
+    }
+
+    /// The derivatives of the energy by the entries of the matrix; of a matrix with positive determinant.
+    pub(crate) fn gradient(&self, j: &[f64; 4]) -> [f64; 4] {
+        self.derivatives(j).0
+    }
+
+    /// Its gradient and its Hessian made positive semidefinite.
+    pub(super) fn derivatives(&self, j: &[f64; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
+        let det = j[0] * j[3] - j[1] * j[2];
+        let turned = [j[3], -j[2], -j[1], j[0]];
+        let weights = self.weights();
+        let (norm, m) = (self.norm(j), self.determinant);
+        // e = ½ (N/D + λ (D/m + m/D)): first and second derivatives with respect to D.
+        let first = 0.5 * (-norm / (det * det) + self.size * (1.0 / m - m / (det * det)));
+        let second = (norm + self.size * m) / (det * det * det);
+        let mut gradient = [0.0; 4];
+        let mut hessian = [[0.0; 4]; 4];
+        for r in 0..4 {
+            let pull = weights[r] * j[r];
+            gradient[r] = pull / det + first * turned[r];
+            hessian[r][r] += weights[r] / det;
+            for c in 0..4 {
+                hessian[r][c] += second * turned[r] * turned[c];
+                hessian[r][c] -= (pull * turned[c] + turned[r] * weights[c] * j[c]) / (det * det);
+            }
+        }
+        for (r, sign) in [1.0, -1.0, -1.0, 1.0].into_iter().enumerate() {
+            hessian[r][3 - r] += sign * first;
+        }
+        (gradient, semidefinite(hessian))
+    }
+}
+
+/// The nearest positive semidefinite matrix: negative eigenvalues become zero (Jacobi's method).
+fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+    let mut a = matrix;
+    let mut v = [[0.0; 4]; 4];
+    for (i, row) in v.iter_mut().enumerate() {
+        row[i] = 1.0;
+    }
+    for _ in 0..SWEEPS {
+        for p in 0..3 {
+            for q in p + 1..4 {
+                rotate(&mut a, &mut v, p, q);
+            }
+        }
+    }
+    if (0..4).all(|i| a[i][i] >= 0.0) {
+        return matrix;
+    }
+    let mut out = [[0.0; 4]; 4];
+    for r in 0..4 {
+        for c in 0..4 {
+            out[r][c] = (0..4).map(|k| a[k][k].max(0.0) * v[r][k] * v[c][k]).sum();
+        }
+    }
+    out
+}
+
+/// Makes entry `(p, q)` of a symmetric matrix vanish; `v` collects the rotations.
+fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
+    if a[p][q] == 0.0 {
+        return;
+    }
+    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let c = 1.0 / (t * t + 1.0).sqrt();
+    let s = t * c;
+    for row in a.iter_mut() {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
+    for k in 0..4 {
+        (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+    }
+    for row in v.iter_mut() {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DENSITY: Density = Density { anisotropy: 3.0, size: 0.4, determinant: 2.0 };
+
+    #[test]
+    fn the_gradient_is_that_of_the_energy() {
+        let at = [1.1, 0.3, -0.4, 0.9];
+        let (gradient, _) = DENSITY.derivatives(&at);
+        for k in 0..4 {
+            let moved = |d: f64| {
+                let mut j = at;
+                j[k] += d;
+                DENSITY.value(&j).unwrap()
+            };
+            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            assert!((slope - gradient[k]).abs() < 1e-8, "{k}: {slope} {}", gradient[k]);
+        }
+    }
+
+    #[test]
+    fn the_hessian_is_that_of_the_energy_where_it_is_convex() {
+        // At the best matrix conceivable nothing is cut off.
+        let at = [2f64.sqrt(), 0.0, 0.0, 2f64.sqrt()];
+        let (_, hessian) = DENSITY.derivatives(&at);
+        for r in 0..4 {
+            for c in 0..4 {
+                let moved = |d: f64| {
+                    let mut j = at;
+                    j[c] += d;
+                    let det = j[0] * j[3] - j[1] * j[2];
+                    assert!(det > 0.0);
+                    DENSITY.derivatives(&j).0[r]
+                };
+                let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((slope - hessian[r][c]).abs() < 1e-8, "{r} {c}: {slope} {}", hessian[r][c]);
+            }
+        }
+    }
+
+    #[test]
+    fn negative_eigenvalues_become_zero_and_others_stay() {
+        let indefinite = [[1.0, 2.0, 0.0, 0.0], [2.0, 1.0, 0.0, 0.0], [0.0, 0.0, 5.0, 0.0], [0.0, 0.0, 0.0, -1.0]];
+        let want = [[1.5, 1.5, 0.0, 0.0], [1.5, 1.5, 0.0, 0.0], [0.0, 0.0, 5.0, 0.0], [0.0; 4]];
+        let got = semidefinite(indefinite);
+        for r in 0..4 {
+            for c in 0..4 {
+                assert!((got[r][c] - want[r][c]).abs() < 1e-12, "{got:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn flat_and_folded_matrices_have_no_energy() {
+        assert_eq!(DENSITY.value(&[1.0, 1.0, 1.0, 1.0]), None);
+        assert_eq!(DENSITY.value(&[1.0, 0.0, 0.0, -1.0]), None);
+    }
+}

@@ -257,8 +257,7 @@ impl<'a> Optimizer<'a> {
         self.steps += 1;
         let State { net, solution, .. } = &self.state;
         // A map without folds keeps chords from vanishing by itself.
-        let extend =
-            |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+        let extend = |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
         let held = if self.shape.is_none() { extend(&mut self.spacing) } else { 0 };
         if held > 0 {
             tracing::debug!(held, "chords held apart");
@@ -401,10 +400,8 @@ impl<'a> Optimizer<'a> {
         } else {
             Vec::new()
         };
-        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective {
-            shape,
-            start: Start::Gradients(&list),
-            steps: NEWTON_STEPS,
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| {
+            Aim::Injective { shape, start: Start::Gradients(&list), steps: NEWTON_STEPS }
         });
         let mut solver = Solver {
             curvature: &self.curvature,

@@ -38,9 +38,7 @@ impl Optimizer<'_> {
         loop {
             self.state = self.solve(self.state.net.clone(), progress)?;
             let State { net, solution, .. } = &self.state;
-            if self.shape.is_some()
-                || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0
-            {
+            if self.shape.is_some() || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
                 break;
             }
         }
@@ -71,9 +69,7 @@ impl Optimizer<'_> {
     /// Makes the triangles around irregular nodes finer.
     fn refine(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let State { net, field, .. } = &self.state;
-        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else {
-            return Ok(());
-        };
+        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else { return Ok(()) };
         self.guided = GuidedSystem::new(&net.mesh)?;
         (self.seamless, self.sizes) = (None, None);
         (self.sharp, self.curvature) = (carried.sharp, carried.at_vertex);

@@ -371,8 +371,9 @@ impl<'w> Course<'w> {
         optimizer.release(job);
         self.rest(&mut optimizer, (0.5, 0.85), progress)?;
         progress.report("Moving nodes", 0.85);
-        let moved =
-            optimizer.finish(progress).and_then(|folds| finished(job, optimizer.state(), &folds, self.area, progress));
+        let moved = optimizer.finish(progress).and_then(|folds| {
+            finished(job, optimizer.state(), &folds, self.area, progress)
+        });
         match moved {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes stay where they were");

@@ -13,7 +13,9 @@ use super::straight::Crossroads;
 use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::mesh::VertexId;
-use crate::param::{Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients};
+use crate::param::{
+    Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients,
+};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::PrincipalCurvature;

@@ -196,7 +196,6 @@ impl QuadLayout {
 
     /// For every arc that is not gone the new one, and whether that runs in its direction: the two sides that a patch
     /// loses between them are one. Every new arc must be the side of a patch that is left.
-    #[expect(clippy::type_complexity, reason = "the field of the same name tells")]
     fn merged_arcs(&self, is_gone: &impl Fn(u32) -> bool) -> Result<Vec<Option<(u32, bool)>>, CollapseError> {
         let mut beside: Vec<Vec<(u32, bool)>> = vec![Vec::new(); self.arcs.len()];
         let mut bears = vec![false; self.arcs.len()];

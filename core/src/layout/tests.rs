@@ -208,12 +208,12 @@ fn loops_on_a_torus_are_taken_out_until_two_are_left() {
     let curves: Vec<_> = (0..3).flat_map(|k| [row(24, 4 * k, true, 0.4), column(24, 12, 7 * k, true, 0.6)]).collect();
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-    let drawing = embed(&arrangement, &layout, &vec![None; 9], &Progress::new()).unwrap();
+    let drawing = embed(&arrangement, &layout, &[None; 9], &Progress::new()).unwrap();
     assert_eq!((layout.chords, layout.patches.len()), (6, 9));
     // A chord is the row or the column that its arcs cross.
     let is_row = |chord: usize| {
         let arc = layout.arcs.iter().position(|a| a.chord as usize == chord).unwrap();
-        arrangement.segments[arc].curve % 2 == 0
+        arrangement.segments[arc].curve.is_multiple_of(2)
     };
     let mut gone = vec![false; 6];
     let mut left = [3, 3];

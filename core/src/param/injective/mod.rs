@@ -192,7 +192,8 @@ impl SeamlessSystem {
         for (f, local) in locals.iter().enumerate() {
             newton.shares.add(f, &local.hessian, &mut open);
             for (k, share) in local.gradient.iter().enumerate() {
-                let (variable, sign) = constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
+                let (variable, sign) =
+                    constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
                 for &(z, c) in self.seams().expression(variable as usize).0 {
                     load[z as usize] -= sign * c * share;
                 }

@@ -30,6 +30,10 @@ use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
 /// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
 const STEP: f64 = 0.75 * 2.0 / 3.0;
 
+/// Share of the energy that a step without folds has to gain to be worth another, and how many may gain less in a row: the
+/// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
+const LITTLE: f64 = 5e-4;
+const IDLE: usize = 2;
 /// Cosine between two steps of a node above which it keeps its direction, and below whose negative it turns back.
 const ALIKE: f64 = 0.3;
 /// By what a step is then lengthened, and how far at most.
@@ -37,6 +41,8 @@ const LONGER: f64 = 1.4;
 const LONGEST: f64 = 6.0;
 /// Steps of Newton's method from one place of the nodes to the next: the first few make up for the move.
 const NEWTON_STEPS: usize = 6;
+/// Rings of triangles around a node that has changed its vertex in which the field turns markedly with it.
+const TURNED_RINGS: usize = 2;
 
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
@@ -116,6 +122,8 @@ pub struct Optimizer<'a> {
     heading: Vec<DVec3>,
     /// Steps taken back since one was made.
     halved: usize,
+    /// Steps in a row that gained next to nothing.
+    idle: usize,
     steps: usize,
 }
 
@@ -203,6 +211,7 @@ impl<'a> Optimizer<'a> {
             pace: vec![1.0; layout.nodes.len()],
             heading: vec![DVec3::ZERO; layout.nodes.len()],
             halved: 0,
+            idle: 0,
             steps: 0,
         }))
     }
@@ -220,7 +229,7 @@ impl<'a> Optimizer<'a> {
 
     /// Whether no further step is to be made.
     pub fn is_done(&self) -> bool {
-        self.steps >= self.settings.steps || self.halved > self.settings.halvings
+        self.steps >= self.settings.steps || self.halved > self.settings.halvings || self.idle >= IDLE
     }
 
     /// The share of the steps at most that are made.
@@ -268,6 +277,8 @@ impl<'a> Optimizer<'a> {
         let better = next.is_some();
         tracing::debug!(step = self.steps, energy = next.as_ref().map(|n| n.solution.energy), "nodes moved");
         if let Some(next) = next {
+            let gain = self.state.solution.energy - next.solution.energy;
+            self.idle = if self.shape.is_some() && gain < LITTLE * next.solution.energy { self.idle + 1 } else { 0 };
             self.state = next;
             self.halved = 0;
             self.adapt();
@@ -305,14 +316,14 @@ impl<'a> Optimizer<'a> {
 
     /// The descent direction at a vertex, as a vector of its polar map.
     fn downhill(&self, v: VertexId) -> DVec2 {
-        let State { net, metric, field, objective, solution } = &self.state;
+        let State { net, metric, field, objective, firmness, solution } = &self.state;
         let (mesh, angle, uv) = (&net.mesh, &field.angle, &solution.map.uv);
         match self.shape {
             // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
             None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
             // About its minimum the energy rises half as fast.
             Some(shape) => {
-                injective_descent(mesh, metric, angle, uv, (objective, shape), v) / (0.25 * (1.0 + shape.anisotropy))
+                injective_descent(mesh, metric, angle, uv, (objective, shape, firmness), v) / (0.25 * (1.0 + shape.anisotropy))
             }
         }
     }
@@ -394,15 +405,13 @@ impl<'a> Optimizer<'a> {
     fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
         let metric = Metric::new(&net.mesh);
         let State { metric: before, field, solution, .. } = &self.state;
-        let same_faces = net.mesh.n_faces() == field.angle.len();
-        let list = if self.shape.is_some() && same_faces {
-            gradients(before, &field.angle, &solution.map.uv)
-        } else {
-            Vec::new()
+        let uv = &solution.map.uv;
+        let (list, turned) = match self.shape {
+            Some(_) => (gradients(before, &field.angle, uv), self.turned(&net)),
+            None => (Vec::new(), Vec::new()),
         };
-        let aim = self.shape.map_or(Aim::LeastSquares, |shape| {
-            Aim::Injective { shape, start: Start::Gradients(&list), steps: NEWTON_STEPS }
-        });
+        let start = Start::Moved { uv, gradients: &list, turned: &turned };
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: NEWTON_STEPS });
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
@@ -417,6 +426,27 @@ impl<'a> Optimizer<'a> {
         let next = solver.solve(net, metric, Some(&self.state.field.angle), aim, progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);
         next
+    }
+
+    /// The triangles around nodes that are at another vertex in `net` than before, and around those vertices.
+    fn turned(&self, net: &Net) -> Vec<bool> {
+        let mesh = &net.mesh;
+        let mut near = vec![false; mesh.n_vertices()];
+        for (old, new) in self.state.net.nodes.iter().zip(&net.nodes).filter(|(old, new)| old.vertex != new.vertex) {
+            for v in [old.vertex, new.vertex] {
+                near[v.index()] = true;
+            }
+        }
+        let mut turned = vec![false; mesh.n_faces()];
+        for _ in 0..TURNED_RINGS {
+            for f in mesh.faces() {
+                turned[f.index()] |= mesh.face_vertices(f).iter().any(|v| near[v.index()]);
+            }
+            for f in mesh.faces().filter(|f| turned[f.index()]) {
+                mesh.face_vertices(f).iter().for_each(|v| near[v.index()] = true);
+            }
+        }
+        turned
     }
 
     /// The net with regular nodes, and only these, brought to the crossings of their isolines.

@@ -5,7 +5,7 @@ use super::descent::Optimizer;
 use super::solver::State;
 use crate::field::GuidedSystem;
 use crate::mesh::TriMesh;
-use crate::param::Fold;
+use crate::param::{Effort, Fold};
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
@@ -16,6 +16,9 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
+/// From more folds than this on the map as a whole does not fit its constraints: to look for one without folds from
+/// another start is quicker and finds it.
+const HOPELESS: usize = 50;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
 
@@ -49,11 +52,15 @@ impl Optimizer<'_> {
             return Ok(Vec::new());
         }
         self.stiffen(progress)?;
-        let State { net, metric, field, objective, solution } = &mut self.state;
+        if self.state.flipped() > HOPELESS {
+            return Err(EmbeddingError::Folded);
+        }
+        let State { net, metric, field, objective, solution, .. } = &mut self.state;
         let Some(system) = &self.seamless else { return Ok(Vec::new()) };
         objective.stiffness.clear();
         let quarters = net.quarters();
-        let unfolded = system.unfold(&net.mesh, metric, field, objective, (&solution.free, &quarters), progress)?;
+        let at = (&solution.free[..], &quarters[..]);
+        let unfolded = system.unfold(&net.mesh, metric, field, objective, at, Effort::Thorough, progress)?;
         tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
         solution.map = system.map(&unfolded.y);
         solution.energy = unfolded.energy;

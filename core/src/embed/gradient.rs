@@ -18,6 +18,7 @@ use crate::surface::PolarMap;
 /// values of both coordinates (the node's first), the direction of `u_t`.
 #[derive(Debug, Clone, Copy)]
 struct Wedge {
+    face: FaceId,
     outer: [DVec2; 2],
     uv: [DVec2; 3],
     axis: DVec2,
@@ -43,10 +44,12 @@ pub(super) fn injective_descent(
     metric: &Metric,
     angle: &[f64],
     uv: &[[DVec2; 3]],
-    (objective, shape): (&Objective, Shape),
+    (objective, shape, firmness): (&Objective, Shape, &[f64]),
     v: VertexId,
 ) -> DVec2 {
-    wedges(mesh, metric, angle, uv, objective, v).iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape)).sum()
+    let share = |w: &Wedge| firmness.get(w.face.index()).copied().unwrap_or(1.0);
+    let wedges = wedges(mesh, metric, angle, uv, objective, v);
+    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.softened(share(w)))).sum()
 }
 
 fn wedges(
@@ -67,6 +70,7 @@ fn wedges(
             let reach = [metric.length(h), metric.length(mesh.prev(h))];
             let w = uv[f.index()];
             Wedge {
+                face: f,
                 outer: [DVec2::from_angle(at) * reach[0], DVec2::from_angle(far) * reach[1]],
                 uv: [w[i], w[(i + 1) % 3], w[(i + 2) % 3]],
                 axis: DVec2::from_angle(at + angle[f.index()] - metric.direction(h)),
@@ -145,6 +149,7 @@ mod tests {
             let reach = |i: u32| 1.0 + 0.6 * noise(31 * k + i % n);
             let wedges: Vec<Wedge> = (0..n)
                 .map(|i| Wedge {
+                    face: FaceId(i),
                     outer: [0, 1].map(|j| DVec2::from_angle(turn * f64::from(i + j)) * reach(i + j)),
                     uv: [1, 2, 3].map(|j| DVec2::new(noise(7 * k + i + j), noise(11 * k + 3 * i + j))),
                     axis: DVec2::from_angle(3.0 * noise(k + i)),
@@ -170,6 +175,7 @@ mod tests {
         let corner = |i: u32| DVec2::from_angle(turn * f64::from(i)) * (1.0 + 0.1 * f64::from(i % n));
         let wedges: Vec<Wedge> = (0..n)
             .map(|i| Wedge {
+                face: FaceId(i),
                 outer: [corner(i), corner(i + 1)],
                 uv: [bent(DVec2::ZERO), bent(corner(i)), bent(corner(i + 1))],
                 axis: DVec2::from_angle(0.2 + 0.1 * f64::from(i)),

@@ -69,10 +69,9 @@ impl Drawn {
     }
 }
 
-/// How much misalignment counts, and size beside shape. Measured on layouts of the benchmark page: less anisotropy lets
-/// arcs stray from principal directions, more costs angles; size is to keep patches of one strip from shrinking away, not
-/// to be paid for by angles.
-pub(super) const SHAPE: Shape = Shape { anisotropy: 3.0, size: 0.1 };
+/// How much size counts beside shape: enough to keep patches of one strip from shrinking away, little enough not to be
+/// paid for by angles.
+const SIZE: f64 = 0.05;
 /// Steps of Newton's method for a first map: it has long converged by then.
 const STEPS: usize = 60;
 
@@ -89,7 +88,7 @@ impl<'a> Optimizer<'a> {
             *f = FaceId(drawn.base_face[f.index()]);
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::Injective { shape: SHAPE, start: Start::Map(&drawn.uv), steps: STEPS };
+        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
         Self::on(job, (net, sharp, curvature), (aim, false), progress)
     }
 
@@ -103,9 +102,13 @@ impl<'a> Optimizer<'a> {
         (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
         progress: &Progress,
     ) -> Result<Option<Self>, EmbeddingError> {
-        let aim = Aim::Injective { shape: SHAPE, start: Start::Map(&state.solution.map.uv), steps: STEPS };
+        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
         Self::on(job, (state.net, sharp, curvature), (aim, true), progress)
     }
+}
+
+fn shape(job: &Job<'_>) -> Shape {
+    Shape { anisotropy: job.settings.anisotropy, size: SIZE }
 }
 
 impl Drawn {

@@ -12,9 +12,9 @@ use super::spacing::Spacing;
 use super::straight::Crossroads;
 use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
-use crate::mesh::VertexId;
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::param::{
-    Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients,
+    Effort, Injective, InjectiveEnergy, Objective, ParamError, SeamlessSystem, Shape, Solution, gradients,
 };
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
@@ -41,6 +41,8 @@ pub struct State {
     pub field: CrossField,
     /// What the map minimises.
     pub objective: Objective,
+    /// For each triangle the share of the anisotropy that counts in a map without folds.
+    pub firmness: Vec<f64>,
     /// The map and its energy.
     pub solution: Solution,
 }
@@ -66,8 +68,16 @@ pub(super) enum Aim<'s> {
 pub(super) enum Start<'s> {
     /// From a map without folds: the coordinates of the corners of each triangle.
     Map(&'s [[DVec2; 3]]),
-    /// From a map nearby: the gradients of each triangle in the frame of the field.
-    Gradients(&'s [[f64; 4]]),
+    /// From the map before nodes moved. Where a node has left its vertex or come to another the field turns with it, and
+    /// the gradients as they were in its frame are the better guess.
+    Moved {
+        /// The coordinates of the corners of each triangle before.
+        uv: &'s [[DVec2; 3]],
+        /// The gradients in the frame of the field before.
+        gradients: &'s [[f64; 4]],
+        /// Whether the field turns in a triangle.
+        turned: &'s [bool],
+    },
 }
 
 /// Up to how many folds of the first guess of a map are worth removing one by one.
@@ -110,17 +120,19 @@ impl Solver<'_> {
             Vec::new()
         };
         let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
+        let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let system = self.build(&net, &metric, &field, &nodes)?;
         progress.check()?;
         let solution = match aim {
             Aim::LeastSquares => Some(system.solve(&metric, &field, &objective, progress)?),
             Aim::Injective { shape, start, steps } => {
-                let setting = Setting { net: &net, metric: &metric, field: &field, objective: &objective };
+                let setting =
+                    Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness: &firmness };
                 setting.injective(system, shape, start, steps, progress)?
             }
         };
-        Ok(solution.map(|solution| State { net, metric, field, objective, solution }))
+        Ok(solution.map(|solution| State { net, metric, field, objective, firmness, solution }))
     }
 
     /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
@@ -218,6 +230,7 @@ struct Setting<'s> {
     metric: &'s Metric,
     field: &'s CrossField,
     objective: &'s Objective,
+    firmness: &'s [f64],
 }
 
 impl Setting<'_> {
@@ -229,18 +242,26 @@ impl Setting<'_> {
         steps: usize,
         progress: &Progress,
     ) -> Result<Option<Solution>, EmbeddingError> {
-        let Self { net, metric, field, objective } = *self;
-        let free = match start {
-            Start::Map(uv) => system.fit(metric, &field.angle, &gradients(metric, &field.angle, uv))?,
-            Start::Gradients(list) => system.fit(metric, &field.angle, list)?,
+        let Self { net, metric, field, objective, firmness } = *self;
+        let wanted = match start {
+            Start::Map(uv) => gradients(metric, &field.angle, uv),
+            Start::Moved { uv, gradients: before, turned } => {
+                let mut list = gradients(metric, &field.angle, uv);
+                for (f, g) in list.iter_mut().enumerate().filter(|(f, _)| turned[*f]) {
+                    *g = before[f];
+                }
+                list
+            }
         };
+        let free = system.fit(metric, &field.angle, &wanted)?;
         progress.check()?;
-        let energy = InjectiveEnergy::new(metric, &field.angle, objective, shape);
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness));
         let mut found = system.injective(&energy, free.clone());
         let folds = energy.folds(&system.map(&free).uv);
         if found.is_none() && folds <= FEW {
             let quarters = net.quarters();
-            let unfolded = system.unfold(&net.mesh, metric, field, objective, (&free, &quarters), progress)?;
+            let (mesh, at) = (&net.mesh, (&free[..], &quarters[..]));
+            let unfolded = system.unfold(mesh, metric, field, objective, at, Effort::Quick, progress)?;
             tracing::debug!(folds, left = unfolded.folds.len(), "folds of the first guess");
             found = system.injective(&energy, unfolded.y);
         }
@@ -252,6 +273,23 @@ impl Setting<'_> {
         let Injective { map, free, energy } = at;
         Ok(Some(Solution { map, free, energy }))
     }
+}
+
+/// How far directions are told by the shape of the surface: not at all where it bends alike in all directions, fully where
+/// principal curvatures differ by much more than on average. It is this difference, squared, by which the deviation from
+/// principal directions is measured.
+fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
+    let bent = |f: FaceId| {
+        let corners = mesh.face_vertices(f).map(|v| &curvature[v.index()]);
+        corners.iter().map(|c| (c.k_max - c.k_min).powi(2)).sum::<f64>() / 3.0
+    };
+    let each: Vec<f64> = mesh.faces().map(bent).collect();
+    let (sum, area) = mesh.faces().fold((0.0, 0.0), |(sum, area), f| {
+        let a = mesh.face_area(f);
+        (sum + a * each[f.index()], area + a)
+    });
+    let mean = (sum / area).max(f64::MIN_POSITIVE);
+    each.into_iter().map(|b| b / (b + mean)).collect()
 }
 
 /// A guide as strong as it agrees with the field at hand; `None` where it does not.

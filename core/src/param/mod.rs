@@ -22,7 +22,7 @@ pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, gradients};
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};
-pub use unfold::{Fold, FoldReason, OrientationProblem, OrientedTriangle, Unfolded, unfold};
+pub use unfold::{Effort, Fold, FoldReason, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 
 use crate::mesh::EdgeId;
 use crate::progress::Cancelled;

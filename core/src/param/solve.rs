@@ -13,7 +13,7 @@ use super::constraints;
 use super::cut::Cut;
 use super::objective::{Local, Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
-use super::unfold::{OrientationProblem, OrientedTriangle, Unfolded, unfold};
+use super::unfold::{Effort, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
 use crate::field::{CrossField, Metric};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
@@ -265,6 +265,7 @@ impl SeamlessSystem {
         field: &CrossField,
         objective: &Objective,
         (y, quarters): (&[f64], &[u32]),
+        effort: Effort,
         progress: &Progress,
     ) -> Result<Unfolded, ParamError> {
         expect_length("the list of angles around vertices", quarters.len(), mesh.n_vertices())?;
@@ -283,7 +284,7 @@ impl SeamlessSystem {
         };
         let triangles: Vec<OrientedTriangle> = mesh.faces().map(triangle).collect();
         let problem = OrientationProblem { triangles: &triangles, reduction: &self.tied.reduction, quarters };
-        Ok(unfold(&problem, y, progress)?)
+        Ok(unfold(&problem, y, effort, progress)?)
     }
 
     /// The map where the free variables are `y`.

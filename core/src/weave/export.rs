@@ -206,18 +206,8 @@ pub fn finish(
     Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
 }
 
-/// From what factor on a figure has become worse: removing folds may cost a little.
-const WORSE: f64 = 1.05;
-
-/// Why an optimised embedding is no better than the drawing, if so: layouts much coarser than the shape of the surface do
-/// not fit its principal directions, and their limbs are then squeezed.
+/// Why an optimised embedding is no better than the drawing, if so.
 fn no_better(report: &EmbeddingReport, drawn: Option<&Measures>) -> Option<String> {
-    let (before, after) = (report.energy_before, report.energy_after);
-    if after > WORSE * before {
-        return Some(format!(
-            "the optimised map is no better than that of the drawing: energy {before:.3}, then {after:.3}"
-        ));
-    }
     let (before, after) = (drawn?.conformal, report.measures.conformal);
     (after >= before)
         .then(|| format!("the optimised map distorts more than the drawing: {after:.2} instead of {before:.2}"))

@@ -51,6 +51,13 @@ pub struct Shape {
     pub size: f64,
 }
 
+impl Shape {
+    /// What is wanted where only a share of the anisotropy counts.
+    pub(crate) fn softened(self, share: f64) -> Self {
+        Self { anisotropy: 1.0 + share * (self.anisotropy - 1.0), ..self }
+    }
+}
+
 /// A map without folds on its way down.
 #[derive(Debug, Clone)]
 pub struct Injective {
@@ -221,12 +228,19 @@ pub struct InjectiveEnergy<'a> {
     angle: &'a [f64],
     objective: &'a Objective,
     shape: Shape,
+    firmness: &'a [f64],
 }
 
 impl<'a> InjectiveEnergy<'a> {
-    /// The energy of maps along the field of the angles given, of the sizes that `objective` wants.
-    pub fn new(metric: &'a Metric, angle: &'a [f64], objective: &'a Objective, shape: Shape) -> Self {
-        Self { metric, angle, objective, shape }
+    /// The energy of maps along the field of the angles given, of the sizes that `objective` wants. `firmness` tells for
+    /// each triangle which share of the anisotropy counts there, from 0 to 1; empty: all of it.
+    pub fn new(
+        metric: &'a Metric,
+        angle: &'a [f64],
+        objective: &'a Objective,
+        (shape, firmness): (Shape, &'a [f64]),
+    ) -> Self {
+        Self { metric, angle, objective, shape, firmness }
     }
 
     fn hats(&self, f: usize) -> [DVec2; 3] {
@@ -234,7 +248,8 @@ impl<'a> InjectiveEnergy<'a> {
     }
 
     fn density(&self, f: usize) -> Density {
-        Density::new(self.shape, self.objective.target(FaceId::new(f)))
+        let share = self.firmness.get(f).copied().unwrap_or(1.0);
+        Density::new(self.shape.softened(share), self.objective.target(FaceId::new(f)))
     }
 
     /// The energy of a map; `None` where a triangle is turned over or flat.

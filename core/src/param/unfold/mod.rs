@@ -28,6 +28,8 @@ use shape::Shape;
 /// How many rings of triangles around folds may move, one try after the other. Three rings leave a regular vertex
 /// some 50 others to give way; beyond 24 rings the whole surface is as quick.
 const RINGS: [u32; 4] = [3, 6, 12, 24];
+/// How many of these are tried where another guess is as cheap.
+const QUICK: usize = 2;
 /// Rings that may move around folds and all places that share a variable with them. Triangles there are confined
 /// from the start, others where they turn out to fold.
 const BOUND_RINGS: [u32; 2] = [6, 12];
@@ -72,6 +74,15 @@ pub struct OrientationProblem<'a> {
     /// For each vertex the angle around it in the map, in quarter turns: the valence of the field there, 4 where it is
     /// regular; 0 for an angle that is not prescribed, as at a boundary.
     pub quarters: &'a [u32],
+}
+
+/// How much is done to remove folds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// What can be done nearby.
+    Quick,
+    /// All that is known.
+    Thorough,
 }
 
 /// Why a triangle remains folded.
@@ -135,7 +146,12 @@ impl OrientationProblem<'_> {
 /// # Errors
 ///
 /// [`Cancelled`].
-pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> Result<Unfolded, Cancelled> {
+pub fn unfold(
+    problem: &OrientationProblem,
+    y: &[f64],
+    effort: Effort,
+    progress: &Progress,
+) -> Result<Unfolded, Cancelled> {
     progress.report("Removing folds", 0.0);
     let folded = problem.folded(&problem.reduction.expand(y));
     let energy_before = problem.energy(y);
@@ -155,18 +171,19 @@ pub fn unfold(problem: &OrientationProblem, y: &[f64], progress: &Progress) -> R
     }
     if y.iter().all(|y| y.is_finite()) {
         let attempt = Attempt { problem, neighbours: &neighbours, spared: &spared, progress };
-        let mut best = attempt.relieve(y)?;
-        if best.folds > 0 && best.folds <= FEW {
+        let rings = if effort == Effort::Quick { &RINGS[..QUICK] } else { &RINGS };
+        let mut best = attempt.relieve(y, rings)?;
+        let worth = |best: &Candidate| effort == Effort::Thorough && best.folds > 0 && best.folds <= FEW;
+        if worth(&best) {
             best = attempt.relieve_bound(&best.y)?;
         }
-        if best.folds > 0 && best.folds <= FEW {
+        if worth(&best) {
             best = attempt.relax(&best.y)?;
         }
-        if best.folds > 0
-            && best.folds <= FEW
+        if worth(&best)
             && let Some(stiff) = stiffen::stiffen(problem, &neighbours, &spared, progress)?
         {
-            let other = attempt.relieve(&stiff)?;
+            let other = attempt.relieve(&stiff, &RINGS)?;
             if (other.folds, other.energy) < (best.folds, best.energy) {
                 best = other;
             }
@@ -219,10 +236,10 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Unfolds domain by domain, larger and larger ones.
-    fn relieve(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
+    fn relieve(&self, y: &[f64], rings: &[u32]) -> Result<Candidate, Cancelled> {
         let mut y = y.to_vec();
         let mut before: Vec<Domain> = Vec::new();
-        for (i, rings) in RINGS.into_iter().enumerate() {
+        for (i, &rings) in rings.iter().enumerate() {
             let folds = self.folds(&y);
             if folds.is_empty() {
                 break;

@@ -164,7 +164,7 @@ fn related(n: u32) -> Sheet {
 
 fn removed(sheet: &Sheet) -> (Vec<f64>, Unfolded) {
     let y = solved(&sheet.problem());
-    let out = unfold(&sheet.problem(), &y, &Progress::new()).unwrap();
+    let out = unfold(&sheet.problem(), &y, Effort::Thorough, &Progress::new()).unwrap();
     assert_eq!(out.folds.len(), sheet.problem().folded(&sheet.reduction.expand(&out.y)).len());
     (y, out)
 }
@@ -263,8 +263,8 @@ fn work_can_be_cancelled_and_nonsense_comes_back() {
     let sheet = dragged(12);
     let progress = Progress::new();
     let nonsense = vec![f64::NAN; sheet.reduction.n_free()];
-    let out = unfold(&sheet.problem(), &nonsense, &progress).unwrap();
+    let out = unfold(&sheet.problem(), &nonsense, Effort::Thorough, &progress).unwrap();
     assert!(!out.folds.is_empty() && out.y.iter().all(|y| y.is_nan()));
     progress.cancel();
-    assert_eq!(unfold(&sheet.problem(), &solved(&sheet.problem()), &progress), Err(Cancelled));
+    assert_eq!(unfold(&sheet.problem(), &solved(&sheet.problem()), Effort::Thorough, &progress), Err(Cancelled));
 }

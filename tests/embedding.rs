@@ -93,6 +93,17 @@ fn pinned_nodes_stay_and_are_written_as_fixed() {
 }
 
 #[test]
+fn whole_quads_fill_every_patch() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = embed(&script("rounded-cube"), folder.path(), &["--quiet", "--steps", "3", "--integer", "--collapse"]);
+    let layout = &report["layout"];
+    assert_eq!((&layout["patches"], &layout["embedding"]["collapsed"]), (&json!(6), &json!([])));
+    // Opposite patches of a cube have equal sides: as many quads.
+    assert_eq!(layout["quads"].as_u64().unwrap() % 2, 0);
+    assert_eq!((&layout["folded_quads"], &layout["flipped_triangles"]), (&json!(0), &json!(0)));
+}
+
+#[test]
 fn every_step_is_told_unless_asked_to_be_quiet() {
     let folder = tempfile::tempdir().unwrap();
     let input = script("rounded-cube");
@@ -126,13 +137,14 @@ fn what_is_wrong_with_the_input_is_said() {
     };
     let cube = script("rounded-cube");
     let no_node = r#"{"version": 1, "mesh": {"builtin": "torus"}, "nodes": [], "arcs": []}"#;
-    let cases: [(PathBuf, &[&str], &str); 7] = [
+    let cases: [(PathBuf, &[&str], &str); 8] = [
         (folder.path().join("none.layout"), &[], "none.layout"),
         (file("broken.layout", "{"), &[], "is not a Plait layout"),
         (file("later.layout", r#"{"version": 99}"#), &[], "version 99"),
         (file("empty.layout", no_node), &[], "arcs are missing"),
         (cube.clone(), &["--pin-nodes", "99"], "no node 99"),
         (cube.clone(), &["--anisotropy", "0"], "anisotropy"),
+        (cube.clone(), &["--collapse", "0"], "length to collapse"),
         (cube, &["--edge-length", "0"], "edge length"),
     ];
     for (input, more, part) in cases {

@@ -73,7 +73,7 @@ pub struct WeaveArguments {
     #[command(flatten)]
     pub refine: RefineArguments,
     /// Write the layout as it is first drawn, without optimising its embedding.
-    #[arg(long, conflicts_with_all = ["integer", "collapse"])]
+    #[arg(long, conflicts_with_all = ["integer", "simplify", "collapse"])]
     pub no_optimise: bool,
 }
 
@@ -94,6 +94,9 @@ pub struct RefineArguments {
     /// Make patches as wide and high as multiples of a quad's edge, so that quads are squares of one size in the map.
     #[arg(long)]
     pub integer: bool,
+    /// Leave out dual strips one by one, as long as the layout becomes less irregular and the embedding no worse.
+    #[arg(long)]
+    pub simplify: bool,
     /// Collapse arcs that want to be shorter than this, in the mesh's units, with all their dual strip; without a
     /// length, shorter than a quad's edge.
     #[arg(long, value_name = "LENGTH", num_args = 0..=1)]

@@ -9,7 +9,8 @@ use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay, write_all,
+    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay,
+    write_all,
 };
 
 use super::embed::summary;
@@ -66,7 +67,13 @@ pub(super) fn export_options(
         Some(Some(length)) if length.is_finite() && length > 0.0 => Some(Shortest::Length(length)),
         Some(Some(length)) => anyhow::bail!("the length to collapse must be positive, not {length}"),
     };
-    Ok(ExportOptions { size: quad_size(size)?, embedding, integer: refine.integer, collapse })
+    Ok(ExportOptions {
+        size: quad_size(size)?,
+        embedding,
+        integer: refine.integer,
+        simplify: refine.simplify,
+        collapse,
+    })
 }
 
 /// How fine the quads are to be.

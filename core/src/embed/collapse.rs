@@ -2,11 +2,13 @@
 //!
 //! Arcs that want to be shorter than a least length pull the nodes at their ends together: their chord is deleted, and
 //! these become one. Shortest chords come first; of chords that meet in a node only one at a time, since the next map has
-//! other lengths there.
+//! other lengths there. A collapse that makes the map much worse is taken back.
 
 use serde::Serialize;
 
-use crate::layout::{CollapseError, Collapsed, QuadLayout};
+use super::pipeline::Job;
+use crate::layout::{CollapseError, Collapsed, QuadLayout, RedrawError, Redrawn, redraw};
+use crate::progress::Progress;
 
 /// A chord that was collapsed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,6 +40,8 @@ pub(super) struct Collapse<'a> {
     stays: Vec<bool>,
     /// Whether each chord is gone.
     pub gone: Vec<bool>,
+    /// Whether each chord was tried in vain.
+    refused: Vec<bool>,
     /// Those that are, in order.
     pub done: Vec<CollapsedChord>,
     /// Those that cannot be.
@@ -46,24 +50,33 @@ pub(super) struct Collapse<'a> {
 
 impl<'a> Collapse<'a> {
     pub(super) fn new(layout: &'a QuadLayout, stays: Vec<bool>) -> Self {
-        Self { layout, stays, gone: vec![false; layout.chords], done: Vec::new(), kept: Vec::new() }
+        let none = vec![false; layout.chords];
+        Self { layout, stays, gone: none.clone(), refused: none, done: Vec::new(), kept: Vec::new() }
     }
 
-    /// Notes which of these short chords, given by number and length, are to be collapsed now; tells whether any.
-    pub(super) fn choose(&mut self, mut short: Vec<(u32, f64)>) -> bool {
-        short.retain(|&(chord, _)| !self.gone[chord as usize]);
+    /// Notes which of these short chords, given by number and length, are to be collapsed now, at most so many, and if
+    /// so asked only those that make the layout less irregular; returns how many.
+    pub(super) fn choose(&mut self, mut short: Vec<(u32, f64)>, most: usize, simpler: bool) -> usize {
+        short.retain(|&(chord, _)| !self.gone[chord as usize] && !self.refused[chord as usize]);
         short.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        self.kept.clear();
         let before = self.done.len();
+        let mut irregularity = self.attempt().map_or(usize::MAX, |c| c.layout.irregularity());
         let mut touched = vec![false; self.layout.nodes.len()];
         for (chord, length) in short {
+            if self.done.len() == before + most {
+                break;
+            }
             let ends = || self.layout.arcs.iter().filter(move |a| a.chord == chord).flat_map(|a| a.nodes);
             if ends().any(|n| touched[n as usize]) {
                 continue;
             }
             self.gone[chord as usize] = true;
             match self.attempt() {
+                Ok(collapsed) if simpler && collapsed.layout.irregularity() >= irregularity => {
+                    self.gone[chord as usize] = false;
+                }
                 Ok(collapsed) => {
+                    irregularity = collapsed.layout.irregularity();
                     let mut merged = vec![false; self.layout.nodes.len()];
                     ends().for_each(|n| merged[collapsed.nodes[n as usize] as usize] = true);
                     for (t, &now) in touched.iter_mut().zip(&collapsed.nodes) {
@@ -73,19 +86,27 @@ impl<'a> Collapse<'a> {
                 }
                 Err(reason) => {
                     self.gone[chord as usize] = false;
-                    self.kept.push(ShortChord { chord, length, reason });
+                    self.keep(chord, length, reason);
                 }
             }
         }
-        self.done.len() > before
+        self.done.len() - before
     }
 
-    /// Takes back the choices after the first `count`, for a reason.
-    pub(super) fn take_back(&mut self, count: usize, reason: &str) {
-        for c in self.done.drain(count..) {
+    /// Takes back the choices after the first `count`; for a `reason` they are not made again.
+    pub(super) fn take_back(&mut self, count: usize, reason: Option<&str>) {
+        for c in self.done.split_off(count) {
             self.gone[c.chord as usize] = false;
-            self.kept.push(ShortChord { chord: c.chord, length: c.length, reason: reason.to_owned() });
+            if let Some(reason) = reason {
+                self.refused[c.chord as usize] = true;
+                self.keep(c.chord, c.length, reason.to_owned());
+            }
         }
+    }
+
+    fn keep(&mut self, chord: u32, length: f64, reason: String) {
+        self.kept.retain(|k| k.chord != chord);
+        self.kept.push(ShortChord { chord, length, reason });
     }
 
     /// What is left, unless the chords cannot be deleted.
@@ -98,6 +119,12 @@ impl<'a> Collapse<'a> {
             }
         }
         Ok(collapsed)
+    }
+
+    /// What is left, drawn.
+    pub(super) fn draw(&self, job: &Job<'_>, progress: &Progress) -> Result<Redrawn, RedrawError> {
+        let n_surface = job.surface.mesh.n_vertices();
+        redraw(job.layout, job.drawing, &self.gone, |n| self.stays[n], n_surface, progress)
     }
 
     /// Number of patches that a chord runs through.

@@ -76,6 +76,8 @@ pub struct Settings {
     pub spacing: f64,
     /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
     pub collapse: Option<f64>,
+    /// Whether chords are collapsed, one by one, as long as that makes the layout less irregular and the energy no more.
+    pub simplify: bool,
     /// The edge length that all chords are to be multiples of in the end, likewise; `None`: lengths are free.
     pub integer: Option<f64>,
 }
@@ -83,7 +85,16 @@ pub struct Settings {
 impl Default for Settings {
     /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
     fn default() -> Self {
-        Self { steps: 25, halvings: 5, anisotropy: 10.0, sizing: true, spacing: 1.5, collapse: None, integer: None }
+        Self {
+            steps: 25,
+            halvings: 5,
+            anisotropy: 10.0,
+            sizing: true,
+            spacing: 1.5,
+            collapse: None,
+            simplify: false,
+            integer: None,
+        }
     }
 }
 

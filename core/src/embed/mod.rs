@@ -110,6 +110,9 @@ pub enum EmbeddingError {
     /// The patches are not the rectangles the layout says.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
+    /// What is left without collapsed chords could not be drawn.
+    #[error(transparent)]
+    Redraw(#[from] crate::layout::RedrawError),
     /// The patches of the drawing could not be mapped.
     #[error(transparent)]
     Patch(#[from] PatchError),

@@ -10,7 +10,7 @@ use super::net::Headings;
 use super::solver::State;
 use super::trace::{ArcChain, Folds, preview_arcs, trace_arcs};
 use super::{EmbeddingError, emerge, headings, map_rectangles};
-use crate::layout::{Embedding, PatchMap, QuadLayout, Redrawn, redraw};
+use crate::layout::{Embedding, PatchMap, QuadLayout, Redrawn};
 use crate::mesh::VertexId;
 use crate::param::{Fold, FoldReason, Residual, residuals};
 use crate::progress::Progress;
@@ -185,34 +185,76 @@ pub fn optimise(
         }
         Err(error) => return Course::new(job, watch).unfolded(job, Err(error), progress),
     };
-    course.rest(&mut optimizer, (0.05, 0.35), progress)?;
-    let Some(least) = job.settings.collapse.filter(|_| !job.layout.patches.is_empty()) else {
+    course.rest(&mut optimizer, MOVING, progress)?;
+    let Settings { collapse, simplify, .. } = job.settings;
+    if job.layout.patches.is_empty() || (collapse.is_none() && !simplify) {
         return course.finish(job, optimizer, progress);
-    };
-    let stays = optimizer.stays();
-    let mut collapse = Collapse::new(job.layout, stays.clone());
-    let mut round = Shorter::none(job);
-    loop {
-        let short = round.numbers(optimizer.short_chords(least));
-        let before = collapse.done.len();
-        let again = course.next == Next::Continue && collapse.choose(short);
-        let redrawn = again.then(|| {
-            redraw(job.layout, job.drawing, &collapse.gone, |n| stays[n], job.surface.mesh.n_vertices(), progress)
-        });
-        progress.check()?;
-        match redrawn {
-            Some(Ok(redrawn)) => round = Shorter::new(job, redrawn),
-            Some(Err(error)) => {
-                collapse.take_back(before, &error.to_string());
-                return course.finish_shorter(job, &round, collapse, optimizer, progress);
-            }
-            None => return course.finish_shorter(job, &round, collapse, optimizer, progress),
-        }
-        tracing::debug!(gone = collapse.done.len(), "chords collapsed");
-        optimizer = Optimizer::new(&round.job(job), progress)?;
-        course.show(&optimizer);
-        course.rest(&mut optimizer, (0.05, 0.35), progress)?;
     }
+    let mut shorter = Shorter::none(job);
+    let mut chosen = Collapse::new(job.layout, optimizer.stays());
+    let one_by_one = Rule { least: f64::INFINITY, worse: 1.0, most: 1, simpler: true };
+    let shortest = collapse.map(|least| Rule { least, worse: WORSE, most: job.layout.chords, simpler: false });
+    for mut rule in shortest.into_iter().chain(simplify.then_some(one_by_one)) {
+        while course.next == Next::Continue {
+            let short = shorter.numbers(optimizer.short_chords(rule.least));
+            let before = chosen.done.len();
+            let count = chosen.choose(short, rule.most, rule.simpler);
+            if count == 0 {
+                break;
+            }
+            let most = rule.worse * optimizer.state().solution.energy;
+            let tried = chosen.draw(job, progress).map_err(|error| error.to_string());
+            progress.check()?;
+            let problem = match tried {
+                Ok(redrawn) => {
+                    shorter = Shorter::new(job, redrawn);
+                    optimizer = Optimizer::new(&shorter.job(job), progress)?;
+                    course.rest(&mut optimizer, MOVING, progress)?;
+                    let energy = optimizer.state().solution.energy;
+                    tracing::debug!(gone = chosen.done.len(), energy, most, "chords collapsed");
+                    (energy > most)
+                        .then(|| format!("the energy would be {:.2} of what it is", rule.worse * energy / most))
+                }
+                Err(problem) => Some(problem),
+            };
+            if problem.is_some() {
+                // Of several only one may be to blame.
+                chosen.take_back(before, problem.as_deref().filter(|_| count == 1));
+                rule.most = 1;
+                shorter = match before {
+                    0 => Shorter::none(job),
+                    _ => Shorter::new(job, chosen.draw(job, progress)?),
+                };
+                optimizer = Optimizer::new(&shorter.job(job), progress)?;
+                course.rest(&mut optimizer, MOVING, progress)?;
+            } else {
+                course.show(&optimizer);
+            }
+        }
+    }
+    let mut done = course.finish(&shorter.job(job), optimizer, progress)?;
+    (done.report.collapsed, done.report.short) = (chosen.done, chosen.kept);
+    done.drawing = shorter.redrawn.map(|r| r.embedding);
+    Ok(done)
+}
+
+/// From where to where moving nodes brings the progress of the whole.
+const MOVING: (f64, f64) = (0.05, 0.35);
+
+/// By what factor the energy may grow when arcs are collapsed that are shorter than was asked for.
+const WORSE: f64 = 1.5;
+
+/// Which chords are collapsed.
+#[derive(Debug, Clone, Copy)]
+struct Rule {
+    /// Those shorter than this.
+    least: f64,
+    /// By what factor the energy may grow.
+    worse: f64,
+    /// How many at once.
+    most: usize,
+    /// Whether only those without which the layout is less irregular.
+    simpler: bool,
 }
 
 /// The course of an optimisation.
@@ -301,6 +343,8 @@ impl<'w> Course<'w> {
         let mut done = match found {
             Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Ok((done, _)) if !complete => done,
+            // Nodes that move on would leave the grid.
+            Ok((done, _)) if job.settings.integer.is_some() && done.report.folds.is_empty() => done,
             Ok((done, optimizer)) if done.report.folds.is_empty() => {
                 let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
                 self.without_folds(job, start, progress).or_else(|error| match error {
@@ -345,20 +389,6 @@ impl<'w> Course<'w> {
             }
             done => done,
         }
-    }
-
-    fn finish_shorter(
-        self,
-        job: &Job<'_>,
-        round: &Shorter,
-        collapse: Collapse<'_>,
-        optimizer: Optimizer<'_>,
-        progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
-        let mut done = self.finish(&round.job(job), optimizer, progress)?;
-        (done.report.collapsed, done.report.short) = (collapse.done, collapse.kept);
-        done.drawing = round.redrawn.as_ref().map(|r| r.embedding.clone());
-        Ok(done)
     }
 }
 

@@ -11,11 +11,11 @@ use thiserror::Error;
 use super::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::union_find::UnionFind;
 
-/// Valences that a merged node may have inside the surface: two patches at a node would be folded onto each other, and
-/// more than eight cannot be mapped without great distortion (section 6.9).
-const INNER: std::ops::RangeInclusive<usize> = 3..=8;
+/// Valences that a merged node may have inside the surface, unless one of those it is made of has more: two patches at a
+/// node would be folded onto each other, and triangles hardly span seven and more quarters without folds.
+const INNER: std::ops::RangeInclusive<usize> = 3..=6;
 /// The same on the boundary.
-const BOUNDARY: std::ops::RangeInclusive<usize> = 1..=4;
+const BOUNDARY: std::ops::RangeInclusive<usize> = 1..=3;
 
 /// A layout without some of its chords, and what became of the parts of the one before.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,8 +125,12 @@ impl QuadLayout {
             patches[p] = Some(kept.len() as u32);
             kept.push(Patch { corners, sides });
         }
-        let fits = |n: &Node| if n.boundary { BOUNDARY.contains(&n.valence) } else { INNER.contains(&n.valence) };
-        if let Some(bad) = (0..kinds.len()).find(|&n| merged[n].len() > 1 && !fits(&kinds[n])) {
+        let fits = |n: usize| {
+            let usual = if kinds[n].boundary { BOUNDARY } else { INNER };
+            let most = merged[n].iter().map(|&old| self.nodes[old as usize].valence).fold(*usual.end(), usize::max);
+            (*usual.start()..=most).contains(&kinds[n].valence)
+        };
+        if let Some(bad) = (0..kinds.len()).find(|&n| merged[n].len() > 1 && !fits(n)) {
             return Err(CollapseError::Valence { nodes: merged[bad].clone(), valence: kinds[bad].valence });
         }
         let layout = Self::new(kinds, list, kept, euler)?;
@@ -192,7 +196,6 @@ impl QuadLayout {
 
     /// For every arc that is not gone the new one, and whether that runs in its direction: the two sides that a patch
     /// loses between them are one. Every new arc must be the side of a patch that is left.
-    #[expect(clippy::type_complexity, reason = "the field of the same name tells")]
     fn merged_arcs(&self, is_gone: &impl Fn(u32) -> bool) -> Result<Vec<Option<(u32, bool)>>, CollapseError> {
         let mut beside: Vec<Vec<(u32, bool)>> = vec![Vec::new(); self.arcs.len()];
         let mut bears = vec![false; self.arcs.len()];

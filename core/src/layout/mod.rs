@@ -12,6 +12,8 @@ mod patch;
 mod piece;
 mod redraw;
 mod structure;
+#[cfg(test)]
+mod tests;
 
 pub use collapse::{CollapseError, Collapsed};
 pub(crate) use disc::flipped;

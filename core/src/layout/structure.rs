@@ -231,6 +231,11 @@ impl QuadLayout {
         least
     }
 
+    /// How irregular it is: the sum of what the valences of its nodes are off.
+    pub fn irregularity(&self) -> usize {
+        self.nodes.iter().map(|n| n.valence.abs_diff(if n.boundary { 2 } else { 4 })).sum()
+    }
+
     /// Number of irregular nodes.
     pub fn n_irregular(&self) -> usize {
         self.nodes.iter().filter(|n| !n.is_regular()).count()

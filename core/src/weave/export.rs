@@ -37,6 +37,8 @@ pub struct ExportOptions {
     pub embedding: Option<Settings>,
     /// Whether patches are to be as wide and high as multiples of a quad's edge.
     pub integer: bool,
+    /// Whether dual strips are to be left out that make the layout more irregular and the embedding no better.
+    pub simplify: bool,
     /// Whether arcs that want to be shorter than this are to be collapsed.
     pub collapse: Option<Shortest>,
 }
@@ -53,7 +55,13 @@ pub enum Shortest {
 impl Default for ExportOptions {
     fn default() -> Self {
         // Fine enough that the quads follow the surface to well below half a percent of its size.
-        Self { size: QuadSize::Count(6000), embedding: Some(Settings::default()), integer: false, collapse: None }
+        Self {
+            size: QuadSize::Count(6000),
+            embedding: Some(Settings::default()),
+            integer: false,
+            simplify: false,
+            collapse: None,
+        }
     }
 }
 
@@ -146,6 +154,7 @@ pub fn finish(
         (None, Some(settings)) => {
             let settings = Settings {
                 integer: options.integer.then_some(edge),
+                simplify: options.simplify,
                 collapse: options.collapse.map(|shortest| match shortest {
                     Shortest::Quad => edge,
                     Shortest::Length(length) => length / sketch.units.scale,

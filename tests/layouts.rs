@@ -1,0 +1,364 @@
+//! Woven and made layouts on whole surfaces: the field's topology, descent, alignment, collapsed and rounded chords.
+
+mod support;
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use plait_core::dual::{Mark, RefinedMesh};
+use plait_core::embed::{Embedded, Headings, Job, Net, Next, Optimizer, Settings, Surface, headings, optimise};
+use plait_core::field::{Metric, indices};
+use plait_core::layout::{Arc, Embedding, Node, Patch, QuadLayout, redraw};
+use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh};
+use plait_core::progress::Progress;
+use plait_core::quad::{refine, whole_counts};
+use plait_core::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
+use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
+use support::{meshes, root};
+
+/// A weave script replayed; `None` where its mesh is missing.
+fn woven(name: &str) -> Option<(Session, Drawn)> {
+    meshes()?;
+    let path = root().join("tests/scripts").join(name).with_extension("json");
+    let script = Script::read(&path).unwrap();
+    let session = replay(&script, path.parent().unwrap(), &Progress::new()).unwrap();
+    let drawn = draw(&session, &Progress::new()).unwrap();
+    Some((session, drawn))
+}
+
+/// The end of an arc: the corner at its node, and the heading of the arc away from the node in that triangle.
+fn end(net: &Net, arc: u32, second: bool) -> (HalfedgeId, i32) {
+    let arc = &net.arcs[arc as usize];
+    if !second {
+        return (arc.start, i32::from(arc.heading));
+    }
+    let turns: i32 = arc.crossed.iter().map(|&h| net.jump_across(h)).sum();
+    (arc.end, i32::from(arc.heading) - turns + 2)
+}
+
+#[test]
+fn the_field_turns_as_the_layout_says_on_every_surface() {
+    for name in ["cino_3holes", "pretzel", "fertility_13k", "vase_open", "sleeve", "aqua_center"] {
+        let Some((session, Drawn { layout, embedding })) = woven(name) else { return };
+        let surface = &session.model().mesh;
+        let net = Net::new(surface, &embedding, &layout, &headings(&layout)).unwrap();
+        // Around nodes as their valences say, around every other vertex not at all.
+        let metric = Metric::new(&net.mesh);
+        let found = indices(&net.mesh, &metric, &net.angle, &net.jump);
+        let mut wanted = vec![0; net.mesh.n_vertices()];
+        net.nodes.iter().for_each(|n| wanted[n.vertex.index()] = n.index());
+        for v in net.mesh.vertices().filter(|&v| !net.mesh.is_boundary_vertex(v)) {
+            assert_eq!(found[v.index()], wanted[v.index()], "{name}: {v:?}");
+        }
+        let sum: i32 = net.nodes.iter().map(|n| n.index()).sum();
+        assert_eq!(i64::from(sum), 4 * surface.euler_characteristic(), "{name}");
+        // At every corner of a patch by a quarter from one arc to the next, and along arcs not at all: so along every
+        // cycle of arcs, around handles and boundaries, by the sum of its corners.
+        for patch in &layout.patches {
+            for i in 0..4 {
+                let ((out, forward), (into, came)) = (patch.sides[i], patch.sides[(i + 3) % 4]);
+                let (mut at, mut heading) = end(&net, out, !forward);
+                let (to, next) = end(&net, into, came);
+                while net.mesh.face(at) != net.mesh.face(to) {
+                    let across = net.mesh.prev(at);
+                    heading -= net.jump_across(across);
+                    at = net.mesh.twin(across).unwrap();
+                }
+                assert_eq!((next - heading).rem_euclid(4), 1, "{name}: arcs {out} and {into}");
+            }
+        }
+    }
+}
+
+/// What is embedded.
+struct Stage {
+    mesh: TriMesh,
+    index: SurfaceIndex,
+    curvature: Vec<PrincipalCurvature>,
+    sharp: Vec<bool>,
+}
+
+impl Stage {
+    fn new(mesh: TriMesh) -> Self {
+        let sharp = vec![false; mesh.n_edges()];
+        let curvature = principal_curvature(&mesh, Options::default().curvature_radius, &sharp);
+        Self { index: SurfaceIndex::new(&mesh), curvature, sharp, mesh }
+    }
+
+    fn job<'a>(&'a self, layout: &'a QuadLayout, drawing: &'a Embedding, headings: &'a [Headings]) -> Job<'a> {
+        let Self { mesh, index, curvature, sharp } = self;
+        Job {
+            surface: Surface { mesh, index, curvature, sharp },
+            layout,
+            drawing,
+            headings,
+            pinned_nodes: &[],
+            pinned_arcs: &[],
+            settings: Settings::default(),
+        }
+    }
+}
+
+fn job_of<'a>(session: &'a Session, drawn: &'a Drawn, headings: &'a [Headings]) -> Job<'a> {
+    let model = session.model();
+    Job {
+        surface: Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp },
+        layout: &drawn.layout,
+        drawing: &drawn.embedding,
+        headings,
+        pinned_nodes: &[],
+        pinned_arcs: &[],
+        settings: Settings::default(),
+    }
+}
+
+/// The same drawing with arcs and nodes numbered backward, and patches that begin with their second side.
+fn renumbered(Drawn { layout, embedding }: &Drawn) -> Drawn {
+    let (a, n) = (layout.arcs.len() as u32 - 1, layout.nodes.len() as u32 - 1);
+    let patch = |p: &Patch| Patch {
+        corners: [1, 2, 3, 0].map(|i| n - p.corners[i]),
+        sides: [1, 2, 3, 0].map(|i| (a - p.sides[i].0, p.sides[i].1)),
+    };
+    let arc = |arc: &Arc| Arc { nodes: arc.nodes.map(|k| n - k), ..*arc };
+    let euler = layout.nodes.len() as i64 - layout.arcs.len() as i64 + layout.patches.len() as i64;
+    let nodes = layout.nodes.iter().rev().cloned().collect();
+    let arcs = layout.arcs.iter().rev().map(arc).collect();
+    let turned = QuadLayout::new(nodes, arcs, layout.patches.iter().map(patch).collect(), euler).unwrap();
+    let mut drawing = embedding.clone();
+    for h in 0..3 * drawing.mesh.n_faces() as u32 {
+        if let Mark::Arc(k) = embedding.mesh.mark(h) {
+            drawing.mesh.set_mark(h, Mark::Arc(a - k));
+        }
+    }
+    drawing.nodes.reverse();
+    drawing.arcs.reverse();
+    drawing.arc_parameters.reverse();
+    Drawn { layout: turned, embedding: drawing }
+}
+
+#[test]
+fn the_map_does_not_depend_on_how_parts_are_numbered() {
+    let Some((session, drawn)) = woven("cino_3holes") else { return };
+    let energy = |drawn: &Drawn| {
+        let headings = headings(&drawn.layout);
+        let optimizer = Optimizer::new(&job_of(&session, drawn, &headings), &Progress::new()).unwrap();
+        optimizer.state().solution.energy
+    };
+    let (a, b) = (energy(&drawn), energy(&renumbered(&drawn)));
+    assert!(a > 0.0 && (a - b).abs() < 1e-6 * a, "{a} and {b}");
+}
+
+#[test]
+fn energy_falls_and_half_of_it_in_three_steps() {
+    for name in ["cino_3holes", "pretzel"] {
+        let Some((session, drawn)) = woven(name) else { return };
+        let headings = headings(&drawn.layout);
+        let mut optimizer = Optimizer::new(&job_of(&session, &drawn, &headings), &Progress::new()).unwrap();
+        let mut seen = vec![optimizer.state().solution.energy];
+        while !optimizer.is_done() {
+            let better = optimizer.step(&Progress::new()).unwrap();
+            let (before, now) = (seen[seen.len() - 1], optimizer.state().solution.energy);
+            assert!(if better { now < before } else { now == before }, "{name}: {before}, then {now}");
+            seen.push(now);
+        }
+        let (first, last) = (seen[0], seen[seen.len() - 1]);
+        assert!(first - seen[3] > 0.5 * (first - last), "{name}: {seen:?}");
+    }
+}
+
+#[test]
+fn a_boundary_is_an_isoline_edge_by_edge() {
+    let Some(folder) = meshes() else { return };
+    let source = MeshSource::File(folder.join("lilium.obj"));
+    if !folder.join("lilium.obj").is_file() {
+        return;
+    }
+    let loaded = source.load(std::path::Path::new("")).unwrap();
+    let mut session = Session::open(loaded, source, Options::default(), &Progress::new()).unwrap();
+    session.weave_to(Goal::Valid, &Progress::new()).unwrap();
+    let drawn = draw(&session, &Progress::new()).unwrap();
+    let headings = headings(&drawn.layout);
+    let mut optimizer = Optimizer::new(&job_of(&session, &drawn, &headings), &Progress::new()).unwrap();
+    for _ in 0..3 {
+        optimizer.step(&Progress::new()).unwrap();
+    }
+    optimizer.finish(&Progress::new()).unwrap();
+    let state = optimizer.state();
+    let (mesh, map) = (&state.net.mesh, &state.solution.map);
+    let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
+    let mut edges = 0;
+    for h in mesh.halfedges().filter(|&h| mesh.twin(h).is_none()) {
+        let (heading, _) = state.net.boundary[&h];
+        let along = uv(mesh.next(h)) - uv(h);
+        let (constant, way) = if heading % 2 == 0 { (along.y, along.x) } else { (along.x, along.y) };
+        assert!(constant.abs() < 1e-9, "{constant} across edge of {way}");
+        edges += 1;
+    }
+    assert!(edges > 100, "{edges}");
+}
+
+/// An icosahedron on a sphere, every triangle in three patches around its middle, on a mesh of 1920 triangles: 12 nodes of
+/// valence 5 among 20 of valence 3.
+fn icosahedron() -> (Stage, QuadLayout, Embedding) {
+    let g = 0.5 * (1.0 + 5f64.sqrt());
+    let mut points: Vec<DVec3> = Vec::new();
+    for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
+        points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)]);
+    }
+    let near = |i: usize, j: usize| (points[i].distance(points[j]) - 2.0).abs() < 1e-9;
+    let mut triangles = Vec::new();
+    for (i, j, k) in (0..12).flat_map(|i| (0..12).flat_map(move |j| (0..12).map(move |k| (i, j, k)))) {
+        let outside = (points[j] - points[i]).cross(points[k] - points[i]).dot(points[i]) > 0.0;
+        if i < j && i < k && near(i, j) && near(j, k) && near(k, i) && outside {
+            triangles.push([i as u32, j as u32, k as u32]);
+        }
+    }
+    assert_eq!(triangles.len(), 20);
+    let mut ids: HashMap<[u32; 2], u32> = HashMap::new();
+    let (mut nodes, mut arcs, mut patches) = (vec![5; 12], Vec::<Arc>::new(), Vec::new());
+    let mut faces: Vec<[u32; 3]> = Vec::new();
+    let arc = |arcs: &mut Vec<Arc>, nodes: [u32; 2]| {
+        let known = arcs.iter().position(|a| a.nodes == nodes);
+        known.unwrap_or_else(|| {
+            arcs.push(Arc { nodes, boundary: false, chord: 0 });
+            arcs.len() - 1
+        }) as u32
+    };
+    for t in &triangles {
+        let middle: Vec<u32> = (0..3)
+            .map(|i| {
+                let (a, b) = (t[i], t[(i + 1) % 3]);
+                *ids.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    points.push(0.5 * (points[a as usize] + points[b as usize]));
+                    nodes.push(4);
+                    nodes.len() as u32 - 1
+                })
+            })
+            .collect();
+        let centre = nodes.len() as u32;
+        points.push(t.iter().map(|&v| points[v as usize]).sum::<DVec3>() / 3.0);
+        nodes.push(3);
+        for i in 0..3 {
+            let (on, back) = (middle[i], middle[(i + 2) % 3]);
+            let corners = [t[i], on, centre, back];
+            let sides = [
+                (arc(&mut arcs, [t[i], on]), true),
+                (arc(&mut arcs, [on, centre]), true),
+                (arc(&mut arcs, [back, centre]), false),
+                (arc(&mut arcs, [t[i], back]), false),
+            ];
+            patches.push(Patch { corners, sides });
+            faces.extend([[t[i], on, centre], [t[i], centre, back]]);
+        }
+    }
+    let nodes: Vec<Node> = nodes.into_iter().map(|valence| Node { valence, boundary: false }).collect();
+    let mut paths: Vec<Vec<u32>> = arcs.iter().map(|a| a.nodes.to_vec()).collect();
+    for _ in 0..2 {
+        let mut middle: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut between = |a: u32, b: u32| {
+            *middle.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                points.push(0.5 * (points[a as usize] + points[b as usize]));
+                points.len() as u32 - 1
+            })
+        };
+        let part = |&[a, b, c]: &[u32; 3]| {
+            let (d, e, f) = (between(a, b), between(b, c), between(c, a));
+            [[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+        };
+        faces = faces.iter().flat_map(part).collect();
+        for path in &mut paths {
+            let last = path[path.len() - 1];
+            *path = path.windows(2).flat_map(|w| [w[0], between(w[0], w[1])]).chain([last]).collect();
+        }
+    }
+    let positions = points.iter().map(|p| 0.3 * p.normalize()).collect();
+    let mesh = TriMesh::from_faces(positions, &faces).unwrap();
+    let mut refined = RefinedMesh::new(&mesh);
+    for (a, path) in (0..).zip(&paths) {
+        for w in path.windows(2) {
+            let h = refined.find(w[0], w[1]).unwrap();
+            refined.set_mark(h, Mark::Arc(a));
+        }
+    }
+    let drawing = Embedding {
+        mesh: refined,
+        base_face: (0..mesh.n_faces() as u32).collect(),
+        nodes: (0..nodes.len() as u32).collect(),
+        arc_parameters: paths.iter().map(|p| (0..p.len()).map(|i| i as f64).collect()).collect(),
+        arcs: paths,
+        // Every patch was two triangles, each of them sixteen now.
+        seeds: (0..patches.len() as u32).map(|p| 32 * p).collect(),
+    };
+    (Stage::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), drawing)
+}
+
+fn embedded(settings: Settings) -> (QuadLayout, Embedded) {
+    let (stage, layout, drawing) = icosahedron();
+    embedded_on(&stage, layout, &drawing, settings)
+}
+
+fn embedded_on(stage: &Stage, layout: QuadLayout, drawing: &Embedding, settings: Settings) -> (QuadLayout, Embedded) {
+    let headings = headings(&layout);
+    let job = Job { settings, ..stage.job(&layout, drawing, &headings) };
+    let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+    done.layout.check(2).unwrap();
+    let sum: i64 = done.layout.nodes.iter().map(|n| 4 - n.valence as i64).sum();
+    assert_eq!(sum, 8);
+    (layout, done)
+}
+
+#[test]
+fn short_chords_are_collapsed() {
+    let (_, plain) = embedded(Settings::default());
+    assert!(plain.report.collapsed.is_empty() && plain.drawing.is_none());
+    let shortest = plain.maps.iter().flat_map(|m| [m.size.x, m.size.y]).fold(f64::INFINITY, f64::min);
+    let (given, done) = embedded(Settings { collapse: Some(1.2 * shortest), ..Settings::default() });
+    let report = &done.report;
+    assert!(!report.collapsed.is_empty(), "{report:?}");
+    assert_eq!(done.layout.chords, given.chords - report.collapsed.len());
+    assert!(done.layout.patches.len() < given.patches.len() && done.drawing.is_some());
+    assert!(done.maps.iter().all(|m| m.flipped == 0 && m.size.min_element() > 0.0));
+}
+
+#[test]
+fn strips_are_left_out_that_only_make_a_layout_irregular() {
+    // The chords of the icosahedron go around its corners, and those of three corners of a triangle cross in it. Without
+    // two of these the corners are one node, and without the third the middle of the triangle becomes a part of it.
+    let (stage, layout, drawing) = icosahedron();
+    let simpler = |layout: &QuadLayout| {
+        let less = |c| layout.collapse(c).is_ok_and(|left| left.layout.irregularity() < layout.irregularity());
+        (0..layout.chords as u32).any(less)
+    };
+    assert!(!simpler(&layout));
+    let pairs = (0..layout.chords).flat_map(|a| (0..a).map(move |b| (a, b)));
+    let mut gone = pairs.map(|(a, b)| (0..layout.chords).map(|c| c == a || c == b).collect::<Vec<bool>>());
+    let gone = gone.find(|gone| layout.without(gone).is_ok_and(|left| simpler(&left.layout))).unwrap();
+    let left = redraw(&layout, &drawing, &gone, |_| false, stage.mesh.n_vertices(), &Progress::new()).unwrap();
+    let settings = Settings { simplify: true, ..Settings::default() };
+    let (given, done) = embedded_on(&stage, left.layout, &left.embedding, settings);
+    assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);
+    assert_eq!(done.layout.chords, given.chords - done.report.collapsed.len());
+}
+
+#[test]
+fn patches_are_whole_numbers_of_quads() {
+    let edge = 0.06;
+    let (_, done) = embedded(Settings { integer: Some(edge), ..Settings::default() });
+    let (counts, off) = whole_counts(&done.layout, &done.maps, edge);
+    assert!(off < 1e-9, "{off}");
+    let quads = refine(&done.layout, &done.embedding, &done.maps, &counts);
+    let whole: f64 = done.maps.iter().map(|m| m.size.x * m.size.y).sum();
+    assert!((quads.quads.len() as f64 * edge * edge - whole).abs() < 1e-9, "all quads are unit squares");
+    let triangles: Vec<[u32; 3]> = quads.quads.iter().flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]).collect();
+    assert_eq!(TriMesh::from_faces(quads.positions, &triangles).unwrap().euler_characteristic(), 2);
+
+    for name in ["cino_3holes", "pretzel"] {
+        let Some((session, drawn)) = woven(name) else { return };
+        let headings = headings(&drawn.layout);
+        let settings = Settings { integer: Some(0.05), steps: 3, ..Settings::default() };
+        let job = Job { settings, ..job_of(&session, &drawn, &headings) };
+        let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+        let (_, off) = whole_counts(&done.layout, &done.maps, 0.05);
+        assert!(off < 1e-8, "{name}: {off}");
+    }
+}

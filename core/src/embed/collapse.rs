@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use super::pipeline::Job;
+use super::job::Job;
 use crate::layout::{CollapseError, Collapsed, QuadLayout, RedrawError, Redrawn, redraw};
 use crate::progress::Progress;
 

@@ -10,13 +10,14 @@ use glam::{DVec2, DVec3};
 
 use super::cross::step_to_crossing;
 use super::gradient::{descent, injective_descent};
+use super::job::Job;
 use super::net::Net;
-use super::pipeline::Job;
 use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
-use super::solver::{Aim, Features, Solver, Start, State};
+use super::solver::{Aim, Features, Solver, Start};
 use super::spacing::{Spacing, lengths};
+use super::state::State;
 use super::straight::{ArcEnd, Crossroads};
 use super::{EmbeddingError, voronoi};
 use crate::field::{GuidedSystem, Metric};
@@ -152,7 +153,8 @@ impl<'a> Optimizer<'a> {
             surface.curvature[at.nearest_vertex(surface.mesh).index()]
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
-        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, Features::Held), progress)?.ok_or(EmbeddingError::Folded)
+        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, Features::Held), progress)?
+            .ok_or(EmbeddingError::Folded)
     }
 
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
@@ -275,7 +277,8 @@ impl<'a> Optimizer<'a> {
         self.steps += 1;
         let State { net, solution, .. } = &self.state;
         // A map without folds keeps chords from vanishing by itself.
-        let extend = |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+        let extend =
+            |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
         let held = if self.shape.is_none() { extend(&mut self.spacing) } else { 0 };
         if held > 0 {
             tracing::debug!(held, "chords held apart");
@@ -332,7 +335,8 @@ impl<'a> Optimizer<'a> {
             None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
             // About its minimum the energy rises half as fast.
             Some(shape) => {
-                injective_descent(mesh, metric, angle, uv, (objective, shape, firmness), v) / (0.25 * (1.0 + shape.anisotropy))
+                injective_descent(mesh, metric, angle, uv, (objective, shape, firmness), v)
+                    / (0.25 * (1.0 + shape.anisotropy))
             }
         }
     }

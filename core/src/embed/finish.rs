@@ -2,7 +2,8 @@
 
 use super::EmbeddingError;
 use super::descent::{HOPELESS, Optimizer};
-use super::solver::{Features, State};
+use super::solver::Features;
+use super::state::State;
 use crate::field::GuidedSystem;
 use crate::mesh::TriMesh;
 use crate::param::{Effort, Fold};
@@ -38,7 +39,9 @@ impl Optimizer<'_> {
         loop {
             self.state = self.solve(self.state.net.clone(), progress)?;
             let State { net, solution, .. } = &self.state;
-            if self.shape.is_some() || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
+            if self.shape.is_some()
+                || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0
+            {
                 break;
             }
         }
@@ -87,7 +90,9 @@ impl Optimizer<'_> {
     /// Makes the triangles around irregular nodes finer.
     fn refine(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let State { net, field, .. } = &self.state;
-        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else { return Ok(()) };
+        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else {
+            return Ok(());
+        };
         self.guided = GuidedSystem::new(&net.mesh)?;
         (self.seamless, self.sizes) = (None, None);
         (self.sharp, self.curvature) = (carried.sharp, carried.at_vertex);

@@ -8,9 +8,10 @@ use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
 use super::descent::{Optimizer, Surface};
+use super::job::Job;
 use super::net::Net;
-use super::pipeline::Job;
-use super::solver::{Aim, Features, Start, State};
+use super::solver::{Aim, Features, Start};
+use super::state::State;
 use crate::dual::{Mark, RefinedMesh};
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};

@@ -9,6 +9,7 @@ use super::guides::{feature_guides, shape_guides};
 use super::net::Net;
 use super::sizing::{SizingSystem, rest_turns};
 use super::spacing::Spacing;
+use super::state::State;
 use super::straight::Crossroads;
 use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
@@ -29,23 +30,6 @@ const DISAGREES: f64 = 0.35;
 const DRAWN: f64 = 0.5;
 /// Rounds of guiding the first field, in each of which more directions come to agree.
 const FIRST_ROUNDS: usize = 4;
-
-/// Field and map for nodes at certain places.
-#[derive(Debug, Clone)]
-pub struct State {
-    /// The net: mesh, nodes, arcs.
-    pub net: Net,
-    /// The planar layouts of the mesh's triangles.
-    pub metric: Metric,
-    /// The guiding field.
-    pub field: CrossField,
-    /// What the map minimises.
-    pub objective: Objective,
-    /// For each triangle the share of the anisotropy that counts in a map without folds.
-    pub firmness: Vec<f64>,
-    /// The map and its energy.
-    pub solution: Solution,
-}
 
 /// What map a net is solved for.
 #[derive(Debug, Clone, Copy)]

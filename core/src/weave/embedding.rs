@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use super::design::Pin;
 use super::session::{Session, WeaveError};
+use crate::dual::RegionReport;
 use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, Surface, headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
-use crate::mesh::VertexId;
+use crate::mesh::{TriMesh, VertexId};
 use crate::progress::Progress;
 
 /// A layout and a drawing of it.
@@ -53,14 +54,41 @@ pub fn draw(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError>
     let (model, woven) = (session.model(), session.woven());
     let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
     progress.report("Drawing nodes and arcs", 0.1);
-    let embedding = embed(&woven.arrangement, &layout, &preferred_nodes(session), progress)?;
+    let embedding = embed(&woven.arrangement, &layout, &preferred_nodes(session, &layout), progress)?;
     Ok(Drawn { layout, embedding })
 }
 
-/// The vertex of the only pronounced corner of each region that has just one.
-fn preferred_nodes(session: &Session) -> Vec<Option<VertexId>> {
-    let only = |corners: &[(VertexId, i8)]| (corners.len() == 1).then(|| corners[0].0);
-    session.woven().reports.iter().map(|r| only(&r.corners)).collect()
+/// Where the node of each region is to lie: at its only pronounced corner, or where there is none, at that corner of its
+/// features which is curved most in the sense of the node.
+fn preferred_nodes(session: &Session, layout: &QuadLayout) -> Vec<Option<VertexId>> {
+    let (model, woven) = (session.model(), session.woven());
+    let sharp_corner = feature_corners(&model.mesh, &model.sharp);
+    let of_features = |r: usize| {
+        let sense = 4.0 - layout.nodes[r].valence as f64;
+        let curved = |v: &VertexId| sense * model.vertex_curvatures[v.index()];
+        let faces = woven.arrangement.regions[r].faces.iter();
+        let corners = faces.flat_map(|&f| woven.arrangement.refined.corners(f)).map(VertexId);
+        let candidates = corners.filter(|v| sharp_corner.get(v.index()).copied().unwrap_or(false));
+        let best = candidates.max_by(|a, b| curved(a).total_cmp(&curved(b)).then(b.cmp(a)));
+        best.filter(|v| curved(v) > 0.0)
+    };
+    let of = |(r, report): (usize, &RegionReport)| match report.corners[..] {
+        [(only, _)] => Some(only),
+        [] if !layout.nodes[r].boundary => of_features(r),
+        _ => None,
+    };
+    woven.reports.iter().enumerate().map(of).collect()
+}
+
+/// Whether three or more sharp edges meet at each vertex.
+fn feature_corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<bool> {
+    let mut degree = vec![0; mesh.n_vertices()];
+    for e in mesh.edges().filter(|e| sharp[e.index()]) {
+        for v in mesh.edge_vertices(e) {
+            degree[v.index()] += 1;
+        }
+    }
+    degree.into_iter().map(|d| d > 2).collect()
 }
 
 impl Drawn {

@@ -143,9 +143,7 @@ impl SeamlessSystem {
         let mut patience = PATIENCE;
         for step in 0..steps {
             progress.check()?;
-            let t0 = std::time::Instant::now();
             let (matrix, downhill) = self.newton_matrix(newton, energy, &at.map.uv);
-            let t1 = t0.elapsed().as_secs_f64();
             let solved = newton.symbolic.factor(&matrix).and_then(|f| f.solve(&matrix, &downhill));
             let direction = match solved {
                 Ok(direction) => direction,
@@ -153,13 +151,12 @@ impl SeamlessSystem {
                 Err(SolveError::Residual { .. } | SolveError::NotPositiveDefinite { .. }) => downhill.clone(),
                 Err(_) => return Ok(true),
             };
-            let t2 = t0.elapsed().as_secs_f64();
             let slope: f64 = direction.iter().zip(&downhill).map(|(a, b)| a * b).sum();
             let before = at.energy;
             if !self.search(energy, at, &direction, slope) {
                 return Ok(true);
             }
-            tracing::debug!(step, energy = at.energy, n = matrix.n(), t1, t2, t3 = t0.elapsed().as_secs_f64(), "map without folds");
+            tracing::debug!(step, energy = at.energy, "map without folds");
             if before - at.energy < GAIN * at.energy {
                 patience -= 1;
                 if patience == 0 {
@@ -205,8 +202,7 @@ impl SeamlessSystem {
         for (f, local) in locals.iter().enumerate() {
             newton.shares.add(f, &local.hessian, &mut open);
             for (k, share) in local.gradient.iter().enumerate() {
-                let (variable, sign) =
-                    constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
+                let (variable, sign) = constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
                 for &(z, c) in self.seams().expression(variable as usize).0 {
                     load[z as usize] -= sign * c * share;
                 }

@@ -1,0 +1,203 @@
+//! The course of an optimisation: nodes move, folds go, arcs are traced and patches cut out.
+//!
+//! Least squares come first: their steps are cheap and find where features can be held. What they end with, if it has no
+//! folds, is where maps that never fold go on from; else these start from the drawing.
+
+use super::descent::Optimizer;
+use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Snapshot};
+use super::measures::measure_patches;
+use super::state::State;
+use super::trace::{Folds, trace_arcs};
+use super::{EmbeddingError, emerge, map_rectangles};
+use crate::mesh::FaceId;
+use crate::param::{Fold, FoldReason};
+use crate::progress::Progress;
+
+/// How far the isolines that complete a partial layout are followed, in square roots of the surface's area: many times
+/// around anything, and yet an end.
+const LONGEST: f64 = 100.0;
+
+/// The course of an optimisation.
+pub(super) struct Course<'w> {
+    watch: &'w mut dyn FnMut(&Snapshot) -> Next,
+    pub next: Next,
+    steps: usize,
+    area: f64,
+    energy_before: f64,
+    flipped_before: usize,
+}
+
+impl<'w> Course<'w> {
+    pub(super) fn new(job: &Job<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+        let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
+        Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0 }
+    }
+
+    pub(super) fn begin(job: &Job<'_>, optimizer: &Optimizer<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+        let mut course = Self::new(job, watch);
+        course.energy_before = optimizer.state().solution.energy / course.area;
+        course.flipped_before = optimizer.state().flipped();
+        course.show(optimizer);
+        course
+    }
+
+    pub(super) fn show(&mut self, optimizer: &Optimizer<'_>) {
+        self.next = (self.watch)(&optimizer.state().snapshot(self.steps));
+    }
+
+    /// Moves the nodes until they rest, which is a part of the whole work.
+    pub(super) fn rest(
+        &mut self,
+        optimizer: &mut Optimizer<'_>,
+        (from, to): (f64, f64),
+        progress: &Progress,
+    ) -> Result<(), EmbeddingError> {
+        while self.next == Next::Continue && !optimizer.is_done() && !optimizer.is_hopeless() {
+            progress.report("Moving nodes", from + (to - from) * optimizer.share_done());
+            let better = optimizer.step(progress)?;
+            self.steps += 1;
+            if better {
+                self.show(optimizer);
+            }
+        }
+        Ok(())
+    }
+
+    /// From nodes at rest to the finished embedding.
+    pub(super) fn finish(
+        mut self,
+        job: &Job<'_>,
+        mut optimizer: Optimizer<'_>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let flipped_at_rest = optimizer.state().flipped();
+        if optimizer.is_hopeless() && !job.layout.patches.is_empty() && job.settings.integer.is_none() {
+            let mut done = self.unfolded(job, Err(EmbeddingError::Folded), progress)?;
+            done.report.flipped_at_rest = flipped_at_rest;
+            return Ok(done);
+        }
+        if let Some(edge) = job.settings.integer {
+            progress.report("Rounding lengths", 0.35);
+            optimizer.round(edge, progress)?;
+            self.show(&optimizer);
+            self.rest(&mut optimizer, (0.35, 0.4), progress)?;
+        }
+        progress.report("Removing folds", 0.4);
+        let found = optimizer.finish(progress).and_then(|folds| {
+            let done = finished(job, optimizer.state(), &folds, self.area, progress)?;
+            Ok((done, optimizer))
+        });
+        let mut done = self.unfolded(job, found, progress)?;
+        done.report.flipped_at_rest = flipped_at_rest;
+        Ok(done)
+    }
+
+    /// From what least squares have led to, if anything, to the embedding without folds.
+    pub(super) fn unfolded(
+        mut self,
+        job: &Job<'_>,
+        found: Result<(Embedded, Optimizer<'_>), EmbeddingError>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let complete = !job.layout.patches.is_empty();
+        let mut done = match found {
+            Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Ok((done, _)) if !complete => done,
+            // Nodes that move on would leave the grid.
+            Ok((done, _)) if job.settings.integer.is_some() && done.report.folds.is_empty() => done,
+            Ok((done, optimizer)) if done.report.folds.is_empty() => {
+                let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
+                self.without_folds(job, start, progress).or_else(|error| match error {
+                    EmbeddingError::Cancelled(_) => Err(error),
+                    _ => Ok(done),
+                })?
+            }
+            found => {
+                let start = Optimizer::from_drawing(job, progress);
+                self.without_folds(job, start, progress).or_else(|error| match error {
+                    EmbeddingError::Cancelled(_) => Err(error),
+                    _ => Ok(found?.0),
+                })?
+            }
+        };
+        let report = &mut done.report;
+        (report.steps, report.energy_before, report.flipped_before) =
+            (self.steps, self.energy_before, self.flipped_before);
+        Ok(done)
+    }
+
+    /// Moves the nodes with a map that never folds.
+    pub(super) fn without_folds(
+        &mut self,
+        job: &Job<'_>,
+        start: Result<Option<Optimizer<'_>>, EmbeddingError>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let mut optimizer = start?.ok_or(EmbeddingError::Folded)?;
+        self.show(&optimizer);
+        let safe = optimizer.state().clone();
+        optimizer.release(job);
+        self.rest(&mut optimizer, (0.5, 0.85), progress)?;
+        progress.report("Moving nodes", 0.85);
+        let moved =
+            optimizer.finish(progress).and_then(|folds| finished(job, optimizer.state(), &folds, self.area, progress));
+        match moved {
+            Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
+                tracing::debug!(%error, "nodes stay where they were");
+                finished(job, &safe, &[], self.area, progress)
+            }
+            done => done,
+        }
+    }
+}
+
+/// Arcs and patches of a map that is done. The report lacks what happened before.
+fn finished(
+    job: &Job<'_>,
+    state: &State,
+    folds: &[Fold],
+    area: f64,
+    progress: &Progress,
+) -> Result<Embedded, EmbeddingError> {
+    progress.report("Tracing arcs", 0.9);
+    let strict = if folds.is_empty() { Folds::Refuse } else { Folds::Cross };
+    let (mesh, map) = (&state.net.mesh, &state.solution.map);
+    let (layout, traced) = if job.layout.patches.is_empty() {
+        let emerged = emerge(mesh, map, &state.vertices(), LONGEST * area.sqrt())?;
+        (emerged.layout, emerged.traced)
+    } else {
+        (job.layout.clone(), trace_arcs(mesh, map, job.layout, &state.vertices(), &state.chains(), strict)?)
+    };
+    progress.report("Cutting out patches", 0.95);
+    let mut maps = map_rectangles(&layout, &traced, progress)?;
+    let bending = super::face_curvature(job.surface.mesh, job.surface.curvature, |_| true);
+    let mut embedding = traced.embedding;
+    // Triangles of the working mesh lie in triangles of the surface.
+    let base = |f: &mut u32| *f = state.net.base_face[*f as usize].0;
+    embedding.base_face.iter_mut().for_each(base);
+    maps.iter_mut().flat_map(|m| &mut m.base_face).for_each(base);
+    let (measures, _, _) = measure_patches(&maps, &bending);
+    let place = |f: u32| {
+        let corners = mesh.face_vertices(FaceId(f)).map(|v| mesh.position(v));
+        ((corners[0] + corners[1] + corners[2]) / 3.0).to_array()
+    };
+    let reason = |r: FoldReason| match r {
+        FoldReason::HighValence { quarters, triangles, .. } => {
+            format!("{triangles} triangles cannot span the {quarters} quarter turns around their node")
+        }
+        FoldReason::Fixed => "the constraints leave it no choice".to_owned(),
+        FoldReason::NotResolved => "no map without this fold was found".to_owned(),
+    };
+    let report = EmbeddingReport {
+        steps: 0,
+        energy_before: 0.0,
+        energy_after: state.least_squares() / area,
+        flipped_before: 0,
+        flipped_at_rest: 0,
+        folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),
+        collapsed: Vec::new(),
+        short: Vec::new(),
+        measures,
+    };
+    Ok(Embedded { layout, embedding, maps, drawing: None, report })
+}

@@ -1,0 +1,100 @@
+//! What goes into an optimisation, what is seen of it on the way, and what comes out.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::collapse::{CollapsedChord, ShortChord};
+use super::descent::{Settings, Surface};
+use super::measures::Measures;
+use super::net::Headings;
+use crate::layout::{Embedding, PatchMap, QuadLayout};
+
+/// A layout to be embedded.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    /// The surface.
+    pub surface: Surface<'a>,
+    /// The layout's structure; without patches where arcs are missing.
+    pub layout: &'a QuadLayout,
+    /// A rough drawing of it.
+    pub drawing: &'a Embedding,
+    /// The headings of the arcs' sides in the charts of the regions between them.
+    pub headings: &'a [Headings],
+    /// Nodes that are to stay where the drawing has them; empty: none.
+    pub pinned_nodes: &'a [bool],
+    /// Arcs whose ends are to stay where the drawing has them; empty: none. Between its ends an arc is an isoline.
+    pub pinned_arcs: &'a [bool],
+    /// How to go about it.
+    pub settings: Settings,
+}
+
+/// The embedding while it is being optimised.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// Steps made so far.
+    pub step: usize,
+    /// The energy of the map.
+    pub energy: f64,
+    /// Triangles that the map turns over.
+    pub flipped: usize,
+    /// Where the nodes are.
+    pub nodes: Vec<DVec3>,
+    /// The arcs as polylines; `None` for those that cannot be followed because of folds.
+    pub arcs: Vec<Option<Vec<DVec3>>>,
+}
+
+/// Whether to go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// Go on.
+    Continue,
+    /// Finish with the best so far.
+    Finish,
+}
+
+/// A triangle that the map turns over in the end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RemainingFold {
+    /// A point in it.
+    pub at: [f64; 3],
+    /// Why it could not be unfolded.
+    pub reason: String,
+}
+
+/// What an optimisation has achieved.
+#[derive(Debug, Clone, Serialize)]
+pub struct EmbeddingReport {
+    /// Steps of the nodes.
+    pub steps: usize,
+    /// Energy of the map over the area of the surface, with the nodes where the drawing had them.
+    pub energy_before: f64,
+    /// The same in the end.
+    pub energy_after: f64,
+    /// Triangles turned over at first.
+    pub flipped_before: usize,
+    /// Triangles turned over when the nodes had come to rest, before folds were removed.
+    pub flipped_at_rest: usize,
+    /// Those left.
+    pub folds: Vec<RemainingFold>,
+    /// Chords that were collapsed, in order.
+    pub collapsed: Vec<CollapsedChord>,
+    /// Chords that were to be collapsed and could not be.
+    pub short: Vec<ShortChord>,
+    /// Measures of all patches together.
+    pub measures: Measures,
+}
+
+/// A layout with its optimised embedding.
+#[derive(Debug, Clone)]
+pub struct Embedded {
+    /// The layout; of a partial one, with the arcs and nodes that have emerged after those given.
+    pub layout: QuadLayout,
+    /// Its nodes and arcs on the surface.
+    pub embedding: Embedding,
+    /// The maps of its patches.
+    pub maps: Vec<PatchMap>,
+    /// Where chords were collapsed, the rough drawing of what was left of the layout.
+    pub drawing: Option<Embedding>,
+    /// What was achieved.
+    pub report: EmbeddingReport,
+}

@@ -1,0 +1,82 @@
+//! Field and map for nodes at certain places, and what can be read from them.
+
+use glam::DVec2;
+
+use super::job::Snapshot;
+use super::net::{Net, NetArc};
+use super::trace::{ArcChain, preview_arcs};
+use crate::field::{CrossField, Metric};
+use crate::mesh::VertexId;
+use crate::param::{Objective, Residual, Solution, residuals};
+
+/// Field and map for nodes at certain places.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The net: mesh, nodes, arcs.
+    pub net: Net,
+    /// The planar layouts of the mesh's triangles.
+    pub metric: Metric,
+    /// The guiding field.
+    pub field: CrossField,
+    /// What the map minimises.
+    pub objective: Objective,
+    /// For each triangle the share of the anisotropy that counts in a map without folds.
+    pub firmness: Vec<f64>,
+    /// The map and its energy.
+    pub solution: Solution,
+}
+
+/// Share of the wanted area below which an image is as good as flat.
+const FLAT: f64 = 1e-3;
+
+impl State {
+    /// Number of triangles that the map turns over, or by more than a right angle away from the field.
+    pub fn flipped(&self) -> usize {
+        self.folded().iter().filter(|&&f| f).count()
+    }
+
+    /// For each triangle whether the map turns it over, or by more than a right angle away from the field.
+    pub(super) fn folded(&self) -> Vec<bool> {
+        let errors = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
+        let lengths = |f: usize| self.objective.lengths.get(f).copied().unwrap_or([1.0; 2]);
+        let folded = |(f, r): (usize, &Residual)| {
+            let [a, b] = lengths(f);
+            let (u, v) = (r.u + DVec2::new(a, 0.0), r.v + DVec2::new(0.0, b));
+            u.perp_dot(v) <= FLAT * a * b || u.x / a + v.y / b <= 0.0
+        };
+        errors.iter().enumerate().map(folded).collect()
+    }
+
+    /// The energy of least squares of the map.
+    pub(super) fn least_squares(&self) -> f64 {
+        let each = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
+        each.iter().map(|r| r.energy).sum()
+    }
+
+    pub(super) fn chains(&self) -> Vec<ArcChain<'_>> {
+        let chain = |a: &'_ NetArc| (a.start, a.end, a.heading);
+        self.net
+            .arcs
+            .iter()
+            .map(|a| {
+                let (start, end, heading) = chain(a);
+                ArcChain { start, crossed: &a.crossed, end, heading }
+            })
+            .collect()
+    }
+
+    pub(super) fn vertices(&self) -> Vec<VertexId> {
+        self.net.nodes.iter().map(|n| n.vertex).collect()
+    }
+
+    pub(super) fn snapshot(&self, step: usize) -> Snapshot {
+        let vertices = self.vertices();
+        Snapshot {
+            step,
+            energy: self.solution.energy,
+            flipped: self.flipped(),
+            arcs: preview_arcs(&self.net.mesh, &self.solution.map, &vertices, &self.chains()),
+            nodes: vertices.iter().map(|&v| self.net.mesh.position(v)).collect(),
+        }
+    }
+}

@@ -3,7 +3,8 @@
 //! 1. *Ball*: Dijkstra from all states leaving `v` at once, each label remembering its origin. Where the way out
 //!    of one origin meets the reversed way out of another, both together are a loop, with a corner at `v`. If the
 //!    corner is a turn that is allowed, the loop is real and an upper bound. A loop of cost `C` splits into two
-//!    parts below `C/2`, so the ball needs half the bound as radius.
+//!    parts below `C/2`, so the ball needs half the bound as radius. It stops there and can grow on later, when
+//!    dearer loops are wanted too.
 //! 2. *Corridor*: beyond that radius only states are continued from which the way back is known and the whole
 //!    stays below the bound. Now `D(rev e)` is the exact cheapest way from `e` back to `v`, in any direction, for
 //!    each state that can lie on a loop below the bound.
@@ -20,6 +21,7 @@ use super::boundary::BoundaryField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::stars::Fan;
+use super::vicinity::Vicinity;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
@@ -41,13 +43,15 @@ struct Label {
     settled: bool,
 }
 
+/// States in the order of a key, which is held as bits, which order like non-negative numbers, above the state.
+type Queue = BinaryHeap<Reverse<u64>>;
+
 /// Tentative distances of one search, with its queue.
 #[derive(Debug, Default)]
 pub(super) struct Field {
     labels: Vec<Label>,
     stamp: u32,
-    /// Key as bits, which order like non-negative numbers, above the state.
-    queue: BinaryHeap<Reverse<u64>>,
+    queue: Queue,
 }
 
 impl Field {
@@ -143,11 +147,16 @@ impl Field {
 #[derive(Debug, Default)]
 pub struct SearchWorkspace {
     pub(super) root: Field,
+    /// The states settled in the ball, and those in the corridor beyond it.
+    ball: Vec<State>,
+    corridor: Vec<State>,
+    /// The queue of the ball while the one of the field serves the corridor.
+    rim: Queue,
     /// The second front of a search from both ends.
     pub(super) far: Field,
     /// Per thread, for start directions that are searched at once.
     pub(super) fans: Vec<Mutex<Fan>>,
-    meets: Vec<(State, State)>,
+    pub(super) vicinity: Vicinity,
     /// Per leg of a loop through anchors.
     pub(super) out: Vec<Field>,
     pub(super) home: Vec<Field>,
@@ -222,84 +231,107 @@ pub(super) struct LoopSearch<'a> {
     pub(super) factor: f32,
 }
 
+/// Whether the ball has its radius.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ball {
+    Complete,
+    /// A loop is there and could be shown, but the ball is to grow on.
+    Growing,
+}
+
 impl LoopSearch<'_> {
-    fn limit(&self, best: &Option<Route>) -> f32 {
-        best.as_ref().map_or(f32::INFINITY, |r| r.cost * self.factor)
+    /// Begins step 1.
+    pub(super) fn start(&mut self) {
+        let out = self.graph.leaving(self.vertex);
+        let first = out.start;
+        let SearchWorkspace { root, ball, corridor, .. } = &mut *self.work;
+        root.restart(self.graph.n_states());
+        ball.clear();
+        corridor.clear();
+        for a in out.filter(|&a| self.mask.is_open(a)) {
+            root.set(a, 0.0, NO_STATE, (a - first) as u16);
+            root.push(0.0, a);
+        }
     }
 
-    /// Step 1; improves `best`.
-    pub(super) fn ball(&mut self, best: &mut Option<Route>) -> Result<(), Stop> {
+    /// Step 1: lets the ball grow as far as loops of up to `factor` times the cost of `best` need it, and improves
+    /// `best`. With `pause` it comes back early, so many states after there is a loop at all.
+    pub(super) fn ball(
+        &mut self,
+        best: &mut Option<Route>,
+        factor: f32,
+        pause: Option<u64>,
+    ) -> Result<Ball, Stop> {
         let graph = self.graph;
-        let out = graph.leaving(self.vertex);
-        let first = out.start;
-        self.work.root.restart(graph.n_states());
-        self.work.meets.clear();
-        for a in out.filter(|&a| self.mask.is_open(a)) {
-            self.work.root.set(a, 0.0, NO_STATE, (a - first) as u16);
-            self.work.root.push(0.0, a);
-        }
-        let mut limit = self.limit(best);
-        while let Some((d, e)) = self.work.root.pop() {
-            if d >= 0.5 * limit {
+        let first = graph.leaving(self.vertex).start;
+        let mut cost = best.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        let slack = self.slack();
+        let mut meet = None;
+        let mut patience = if best.is_some() { pause } else { None };
+        let SearchWorkspace { root, ball, .. } = &mut *self.work;
+        let mut outcome = Ok(Ball::Complete);
+        while root.top() < 0.5 * cost * factor {
+            if patience == Some(0) {
+                outcome = Ok(Ball::Growing);
                 break;
             }
-            if !self.work.root.settle(d, e) {
+            let Some((d, e)) = root.pop() else { break };
+            if !root.settle(d, e) {
                 continue;
             }
-            self.meter.tick()?;
-            let origin = self.work.root.labels[e as usize].origin;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
+            if let Err(stop) = self.meter.tick() {
+                outcome = Err(stop);
+                break;
+            }
+            patience = patience.map(|p| p - 1);
+            ball.push(e);
+            let origin = root.labels[e as usize].origin;
+            for f in graph.successors(e) {
                 let reached = d + graph.step(e, f);
-                let back = graph.reverse[f as usize];
-                if let Some(&other) = self.work.root.get(back) {
-                    let total = reached + other.dist;
-                    if other.settled && total < limit {
-                        self.work.meets.push((e, f));
-                    }
-                    if total < best.as_ref().map_or(f32::INFINITY, |r| r.cost) {
-                        let (a, last) =
-                            (first + u32::from(origin), graph.reverse[(first + u32::from(other.origin)) as usize]);
-                        if graph.follows(last, a) {
-                            let cost = total + graph.step(last, a);
-                            if best.as_ref().is_none_or(|r| cost < r.cost) {
-                                *best = Some(Route { cost, states: self.joined(e, back), closed: true });
-                                limit = self.limit(best);
-                            }
-                        }
-                    }
+                if reached >= root.dist(f) || !self.mask.is_open(f) {
+                    continue;
                 }
-                if reached < 0.5 * limit && reached < self.work.root.dist(f) {
-                    self.work.root.set(f, reached, e, origin);
-                    self.work.root.push(reached, f);
+                root.set(f, reached, e, origin);
+                // What is too far stays labelled: the corridor may go on from there.
+                if reached < 0.5 * cost * slack {
+                    root.push(reached, f);
+                }
+                let back = graph.reverse[f as usize];
+                let Some(other) = root.get(back).filter(|other| reached + other.dist < cost) else { continue };
+                let last = graph.reverse[(first + u32::from(other.origin)) as usize];
+                let start = first + u32::from(origin);
+                if graph.follows(last, start) {
+                    let closed = reached + other.dist + graph.step(last, start);
+                    if closed < cost {
+                        patience = patience.or(pause);
+                        (cost, meet) = (closed, Some((e, back, other.parent)));
+                    }
                 }
             }
         }
-        Ok(())
+        if let Some((e, back, before)) = meet {
+            // The label of `back` may have changed since; those of settled states have not.
+            let mut states = root.chain(e);
+            states.push(graph.reverse[back as usize]);
+            if before != NO_STATE {
+                states.extend(root.chain(before).iter().rev().map(|&s| graph.reverse[s as usize]));
+            }
+            *best = Some(Route { cost, states, closed: true });
+        }
+        outcome
     }
 
-    /// The states from the source to `e`, and on along the reverse of the way to `back`.
-    fn joined(&self, e: State, back: State) -> Vec<State> {
-        let mut states = self.work.root.chain(e);
-        states.extend(self.work.root.chain(back).iter().rev().map(|&s| self.graph.reverse[s as usize]));
-        states
-    }
-
-    /// Step 2, for loops cheaper than `limit`.
+    /// Step 2, for loops cheaper than `limit`, half of which is the radius of the ball.
     pub(super) fn corridor(&mut self, limit: f32) -> Result<(), Stop> {
         let graph = self.graph;
-        let root = &mut self.work.root;
+        let SearchWorkspace { root, ball, corridor, rim, .. } = &mut *self.work;
+        std::mem::swap(&mut root.queue, rim);
         root.queue.clear();
-        for &(e, f) in &self.work.meets {
-            let step = graph.step(e, f);
-            let (back_e, back_f) = (graph.reverse[e as usize], graph.reverse[f as usize]);
-            for (x, from, across) in [(f, e, back_f), (back_e, back_f, e)] {
-                let reached = root.dist(from) + step;
-                let settled = root.get(x).is_some_and(|l| l.settled);
-                if !settled && reached <= root.dist(x) && reached + root.settled(across) < limit {
-                    let origin = root.labels[from as usize].origin;
-                    root.set(x, reached, from, origin);
-                    root.push(reached, x);
-                }
+        for &back in ball.iter() {
+            let x = graph.reverse[back as usize];
+            let label = root.get(x).filter(|l| !l.settled).map_or(f32::INFINITY, |l| l.dist);
+            if label + root.dist(back) < limit {
+                root.push(label, x);
             }
         }
         while let Some((d, e)) = root.pop() {
@@ -307,18 +339,33 @@ impl LoopSearch<'_> {
                 continue;
             }
             self.meter.tick()?;
+            corridor.push(e);
             let origin = root.labels[e as usize].origin;
             for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let back = root.settled(graph.reverse[f as usize]);
                 let reached = d + graph.step(e, f);
                 // A settled state keeps its distance: another order of summing must not open it again.
-                if reached + back < limit && reached < root.dist(f) && !root.get(f).is_some_and(|l| l.settled) {
+                if reached < root.dist(f)
+                    && reached + root.settled(graph.reverse[f as usize]) < limit
+                    && !root.get(f).is_some_and(|l| l.settled)
+                {
                     root.set(f, reached, e, origin);
                     root.push(reached, f);
                 }
             }
         }
+        std::mem::swap(&mut root.queue, rim);
         Ok(())
+    }
+
+    /// Back to step 1 after step 2. The distances in the corridor are exact, but the ball has not grown from there.
+    pub(super) fn resume(&mut self) {
+        let SearchWorkspace { root, corridor, .. } = &mut *self.work;
+        for e in corridor.drain(..) {
+            let label = &mut root.labels[e as usize];
+            label.settled = false;
+            let dist = label.dist;
+            root.push(dist, e);
+        }
     }
 
     /// The start directions that can lie on a loop cheaper than `limit`, each with a lower bound, cheapest first.

@@ -185,7 +185,7 @@ fn compare(graph: &ElasticaGraph, mask: &DirectionMask, v: VertexId, factor: f32
         factor,
     };
     let mut routes = Vec::new();
-    search.all(&mut routes, |_| {}).unwrap();
+    search.all(&mut routes, |_, _| {}).unwrap();
     let out: Vec<State> = graph.leaving(v).filter(|&a| mask.is_open(a)).collect();
     let expected: Vec<f32> = out.iter().map(|&a| reference(graph, mask, a)).collect();
     let near = |a: f32, b: f32| (a - b).abs() <= 1e-4 * b;

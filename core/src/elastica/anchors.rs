@@ -218,10 +218,7 @@ impl<'a> Round<'a> {
             self.home[last].push(0.0, source);
         }
         while let Some(leg) = earliest(self.home) {
-            let Some((d, y)) = self.home[leg].pop() else { break };
-            if !self.home[leg].settle(d, y) {
-                continue;
-            }
+            let Some((d, y)) = self.home[leg].settle() else { continue };
             meter.tick()?;
             for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
                 let reached = d + graph.step(y, z);
@@ -246,7 +243,7 @@ impl<'a> Round<'a> {
         if reached + before >= limit {
             return false;
         }
-        if reached < self.home[leg].dist(z) {
+        if self.home[leg].improves(z, reached) {
             self.home[leg].set(z, reached, NO_STATE, 0);
             self.home[leg].push(reached, z);
         }
@@ -273,13 +270,13 @@ impl<'a> Round<'a> {
                 // Once the next anchor can be left, it is never cheaper to stay on this leg.
                 let to = if leg + 1 < n && position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
                 let key = reached + self.home[to].settled(graph.reverse[f as usize]);
-                if key < cost && reached < ahead[to].dist(f) {
+                if key < cost && ahead[to].improves(f, reached) {
                     ahead[to].set(f, reached, parent, leg as u16);
                     ahead[to].push(key, f);
                 }
             }
             let Some(next) = earliest(ahead) else { break };
-            let Some((key, s)) = ahead[next].pop_fresh() else { continue };
+            let Some((key, s)) = ahead[next].settle() else { continue };
             if key >= cost {
                 break;
             }
@@ -301,19 +298,18 @@ fn expand(
     meter: &mut Meter,
     mut reach: impl FnMut(State, f32),
 ) -> Result<(), Stop> {
-    let Some((d, e)) = field.pop() else { return Ok(()) };
-    if !field.settle(d, e) {
-        return Ok(());
-    }
+    let Some((d, e)) = field.settle() else { return Ok(()) };
     meter.tick()?;
-    for f in graph.successors(e).filter(|&f| mask.is_open(f)) {
-        let reached = d + graph.step(e, f);
-        reach(f, reached);
-        if reached < field.dist(f) {
-            field.set(f, reached, e, 0);
-            field.push(reached, f);
+    graph.expand(e, |f, step| {
+        let reached = d + step;
+        if mask.is_open(f) {
+            reach(f, reached);
+            if field.improves(f, reached) {
+                field.set(f, reached, e, 0);
+                field.push(reached, f);
+            }
         }
-    }
+    });
     Ok(())
 }
 
@@ -365,12 +361,9 @@ impl Passage<'_> {
         }
         let (mut cost, mut end) = (f32::INFINITY, None);
         while let Some(leg) = earliest(legs) {
-            let Some((d, e)) = legs[leg].pop() else { continue };
+            let Some((d, e)) = legs[leg].settle() else { continue };
             if d >= cost {
                 break;
-            }
-            if !legs[leg].settle(d, e) {
-                continue;
             }
             if leg == last {
                 let total = d + self.boundary.home(graph, e);
@@ -382,7 +375,7 @@ impl Passage<'_> {
             for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
                 let reached = d + graph.step(e, f);
                 let to = if position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
-                if reached < legs[to].dist(f) {
+                if legs[to].improves(f, reached) {
                     legs[to].set(f, reached, e, leg as u16);
                     legs[to].push(reached, f);
                 }

@@ -55,21 +55,18 @@ impl BoundaryField {
             }
         }
         let mut settled = 0u32;
-        while let Some((d, e)) = field.pop() {
-            if !field.settle(d, e) {
-                continue;
-            }
+        while let Some((d, e)) = field.settle() {
             settled += 1;
             if settled.is_multiple_of(4096) {
                 progress.check()?;
             }
-            for f in graph.successors(e).filter(|&f| mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
-                if reached < field.dist(f) {
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if field.improves(f, reached) && mask.is_open(f) {
                     field.set(f, reached, e, 0);
                     field.push(reached, f);
                 }
-            }
+            });
         }
         Ok(Self { mask: mask.clone(), n_states: graph.n_states(), field })
     }

@@ -31,26 +31,28 @@ pub(super) const ROUNDING: f32 = 1.0 + 1e-5;
 /// States settled between two looks at the wish to stop: some tenths of a millisecond.
 const CHECK_EVERY: u64 = 1024;
 
-/// What is known of a state in one search.
+/// How a state was reached.
 #[derive(Debug, Clone, Copy, Default)]
-struct Label {
-    dist: f32,
-    /// The search this label belongs to; labels of earlier searches do not exist.
-    stamp: u32,
+struct Trail {
     parent: State,
     /// Index among the states leaving the source; with several legs, the leg of the parent.
     origin: u16,
-    settled: bool,
 }
 
-/// States in the order of a key, which is held as bits, which order like non-negative numbers, above the state.
+/// States in the order of a key, as bits above the state.
 type Queue = BinaryHeap<Reverse<u64>>;
 
 /// Tentative distances of one search, with its queue.
+///
+/// A label is a distance as bits, which order like non-negative numbers, below the number of its search. These count
+/// down, by two: labels of earlier searches are larger than any that replaces them, and final ones, which have the
+/// number below, smaller. So one comparison tells whether a label is to be replaced.
 #[derive(Debug, Default)]
 pub(super) struct Field {
-    labels: Vec<Label>,
-    stamp: u32,
+    labels: Vec<u64>,
+    trails: Vec<Trail>,
+    /// Of tentative labels.
+    number: u32,
     queue: Queue,
 }
 
@@ -58,35 +60,52 @@ impl Field {
     /// Forgets everything, without touching it.
     pub(super) fn restart(&mut self, n_states: usize) {
         self.queue.clear();
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.labels.len() != n_states || self.stamp == 0 {
+        if self.labels.len() != n_states || self.number <= 2 {
             self.labels.clear();
-            self.labels.resize(n_states, Label::default());
-            self.stamp = 1;
+            self.labels.resize(n_states, u64::MAX);
+            self.trails.clear();
+            self.trails.resize(n_states, Trail::default());
+            self.number = u32::MAX - 1;
         }
+        self.number -= 2;
     }
 
-    #[inline]
-    fn get(&self, e: State) -> Option<&Label> {
-        let label = &self.labels[e as usize];
-        (label.stamp == self.stamp).then_some(label)
-    }
-
-    /// Tentative distance, infinite where none is known.
+    /// Tentative or final distance, infinite where none is known.
     #[inline]
     pub(super) fn dist(&self, e: State) -> f32 {
-        self.get(e).map_or(f32::INFINITY, |l| l.dist)
+        let label = self.labels[e as usize];
+        if (label >> 32) as u32 <= self.number { f32::from_bits(label as u32) } else { f32::INFINITY }
     }
 
     /// Final distance, infinite where none is known.
     #[inline]
     pub(super) fn settled(&self, e: State) -> f32 {
-        self.get(e).filter(|l| l.settled).map_or(f32::INFINITY, |l| l.dist)
+        let label = self.labels[e as usize];
+        if (label >> 32) as u32 == self.number - 1 { f32::from_bits(label as u32) } else { f32::INFINITY }
+    }
+
+    /// Whether the distance is final.
+    #[inline]
+    pub(super) fn is_settled(&self, e: State) -> bool {
+        (self.labels[e as usize] >> 32) as u32 == self.number - 1
+    }
+
+    #[inline]
+    fn label(&self, dist: f32) -> u64 {
+        u64::from(self.number) << 32 | u64::from(dist.to_bits())
+    }
+
+    /// Whether a distance would replace the one of `e`: that of a settled state stands, as another order of summing
+    /// the same prices must not open it again.
+    #[inline]
+    pub(super) fn improves(&self, e: State, dist: f32) -> bool {
+        self.label(dist) < self.labels[e as usize]
     }
 
     #[inline]
     pub(super) fn set(&mut self, e: State, dist: f32, parent: State, origin: u16) {
-        self.labels[e as usize] = Label { dist, stamp: self.stamp, parent, origin, settled: false };
+        self.labels[e as usize] = self.label(dist);
+        self.trails[e as usize] = Trail { parent, origin };
     }
 
     #[inline]
@@ -94,50 +113,35 @@ impl Field {
         self.queue.push(Reverse(u64::from(key.to_bits()) << 32 | u64::from(e)));
     }
 
+    /// The next state that is not settled, with its key; it is settled now.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<(f32, State)> {
-        self.queue.pop().map(|Reverse(k)| (f32::from_bits((k >> 32) as u32), k as State))
+    pub(super) fn settle(&mut self) -> Option<(f32, State)> {
+        loop {
+            let Reverse(entry) = self.queue.pop()?;
+            let e = entry as State;
+            if !self.is_settled(e) {
+                self.labels[e as usize] -= 1 << 32;
+                return Some((f32::from_bits((entry >> 32) as u32), e));
+            }
+        }
     }
 
     /// Smallest key in the queue, infinite if it is empty.
     #[inline]
     pub(super) fn top(&self) -> f32 {
-        self.queue.peek().map_or(f32::INFINITY, |Reverse(k)| f32::from_bits((k >> 32) as u32))
-    }
-
-    /// Marks a state popped at distance `d` as final; false if that entry is out of date.
-    #[inline]
-    pub(super) fn settle(&mut self, d: f32, e: State) -> bool {
-        let label = &mut self.labels[e as usize];
-        let fresh = !label.settled && d <= label.dist;
-        label.settled |= fresh;
-        fresh
-    }
-
-    /// The next state that was not expanded since it was last set, marked as expanded.
-    #[inline]
-    pub(super) fn pop_fresh(&mut self) -> Option<(f32, State)> {
-        loop {
-            let (key, e) = self.pop()?;
-            let label = &mut self.labels[e as usize];
-            if !label.settled {
-                label.settled = true;
-                return Some((key, e));
-            }
-        }
+        self.queue.peek().map_or(f32::INFINITY, |Reverse(entry)| f32::from_bits((entry >> 32) as u32))
     }
 
     /// The state before `e`, and the tag it was set with.
     pub(super) fn parent(&self, e: State) -> (State, u16) {
-        let label = &self.labels[e as usize];
-        (label.parent, label.origin)
+        let trail = &self.trails[e as usize];
+        (trail.parent, trail.origin)
     }
 
     /// The states from the source to `e`.
     pub(super) fn chain(&self, e: State) -> Vec<State> {
         let mut list: Vec<State> =
-            std::iter::successors(Some(e), |&s| Some(self.labels[s as usize].parent).filter(|&p| p != NO_STATE))
-                .collect();
+            std::iter::successors(Some(e), |&s| Some(self.parent(s).0).filter(|&p| p != NO_STATE)).collect();
         list.reverse();
         list
     }
@@ -275,21 +279,18 @@ impl LoopSearch<'_> {
                 outcome = Ok(Ball::Growing);
                 break;
             }
-            let Some((d, e)) = root.pop() else { break };
-            if !root.settle(d, e) {
-                continue;
-            }
+            let Some((d, e)) = root.settle() else { break };
             if let Err(stop) = self.meter.tick() {
                 outcome = Err(stop);
                 break;
             }
             patience = patience.map(|p| p - 1);
             ball.push(e);
-            let origin = root.labels[e as usize].origin;
-            for f in graph.successors(e) {
-                let reached = d + graph.step(e, f);
-                if reached >= root.dist(f) || !self.mask.is_open(f) {
-                    continue;
+            let origin = root.parent(e).1;
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if !root.improves(f, reached) || !self.mask.is_open(f) {
+                    return;
                 }
                 root.set(f, reached, e, origin);
                 // What is too far stays labelled: the corridor may go on from there.
@@ -297,17 +298,17 @@ impl LoopSearch<'_> {
                     root.push(reached, f);
                 }
                 let back = graph.reverse[f as usize];
-                let Some(other) = root.get(back).filter(|other| reached + other.dist < cost) else { continue };
-                let last = graph.reverse[(first + u32::from(other.origin)) as usize];
-                let start = first + u32::from(origin);
-                if graph.follows(last, start) {
-                    let closed = reached + other.dist + graph.step(last, start);
-                    if closed < cost {
+                let total = reached + root.dist(back);
+                if total < cost {
+                    let (before, other) = root.parent(back);
+                    let (start, last) =
+                        (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
+                    if graph.follows(last, start) && total + graph.step(last, start) < cost {
                         patience = patience.or(pause);
-                        (cost, meet) = (closed, Some((e, back, other.parent)));
+                        (cost, meet) = (total + graph.step(last, start), Some((e, back, before)));
                     }
                 }
-            }
+            });
         }
         if let Some((e, back, before)) = meet {
             // The label of `back` may have changed since; those of settled states have not.
@@ -329,29 +330,24 @@ impl LoopSearch<'_> {
         root.queue.clear();
         for &back in ball.iter() {
             let x = graph.reverse[back as usize];
-            let label = root.get(x).filter(|l| !l.settled).map_or(f32::INFINITY, |l| l.dist);
-            if label + root.dist(back) < limit {
-                root.push(label, x);
+            if !root.is_settled(x) && root.dist(x) + root.dist(back) < limit {
+                root.push(root.dist(x), x);
             }
         }
-        while let Some((d, e)) = root.pop() {
-            if !root.settle(d, e) {
-                continue;
-            }
+        while let Some((d, e)) = root.settle() {
             self.meter.tick()?;
             corridor.push(e);
-            let origin = root.labels[e as usize].origin;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
-                // A settled state keeps its distance: another order of summing must not open it again.
-                if reached < root.dist(f)
+            let origin = root.parent(e).1;
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if root.improves(f, reached)
                     && reached + root.settled(graph.reverse[f as usize]) < limit
-                    && !root.get(f).is_some_and(|l| l.settled)
+                    && self.mask.is_open(f)
                 {
                     root.set(f, reached, e, origin);
                     root.push(reached, f);
                 }
-            }
+            });
         }
         std::mem::swap(&mut root.queue, rim);
         Ok(())
@@ -361,9 +357,8 @@ impl LoopSearch<'_> {
     pub(super) fn resume(&mut self) {
         let SearchWorkspace { root, corridor, .. } = &mut *self.work;
         for e in corridor.drain(..) {
-            let label = &mut root.labels[e as usize];
-            label.settled = false;
-            let dist = label.dist;
+            let (dist, (parent, origin)) = (root.dist(e), root.parent(e));
+            root.set(e, dist, parent, origin);
             root.push(dist, e);
         }
     }

@@ -11,7 +11,7 @@
 
 use std::f32::consts::PI;
 use std::f64::consts::FRAC_PI_2;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -129,6 +129,8 @@ pub struct ElasticaGraph {
     /// Middle of each geodesic, by face: first entry of each face, then state and angle in the face.
     pub(super) middle_first: Vec<u32>,
     pub(super) middle: Vec<(State, f32)>,
+    /// Per state the least cost of a way to the boundary, once it was asked for.
+    pub(super) ways_out: OnceLock<Vec<f32>>,
 }
 
 impl ElasticaGraph {
@@ -184,10 +186,16 @@ impl ElasticaGraph {
             }
         }
         let angle = |way: u32| pairs[way as usize / 2].angles[way as usize % 2];
+        let mut around = Vec::with_capacity(mesh.n_vertices());
+        let mut rest = &mut ways[..];
         for v in 0..mesh.n_vertices() {
-            ways[first[v] as usize..first[v + 1] as usize]
-                .sort_unstable_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b)));
+            let (here, after) = rest.split_at_mut((first[v + 1] - first[v]) as usize);
+            around.push(here);
+            rest = after;
         }
+        around
+            .into_par_iter()
+            .for_each(|here| here.sort_unstable_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b))));
         let mut place = vec![0u32; ways.len()];
         for (state, &way) in ways.iter().enumerate() {
             place[way as usize] = state as u32;
@@ -213,6 +221,7 @@ impl ElasticaGraph {
             window: Vec::new(),
             middle_first,
             middle,
+            ways_out: OnceLock::new(),
         };
         graph.window = (0..graph.n_states()).into_par_iter().map(|e| graph.find_window(e as State)).collect();
         graph

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::graph::ElasticaGraph;
+use super::graph::{ElasticaGraph, State};
 use super::mask::DirectionMask;
 use super::search::{Ball, LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
 use super::vicinity::Vicinity;
@@ -211,8 +211,8 @@ impl LoopSearch<'_> {
     /// The cheapest loop along the state nearest to `direction`.
     fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
         let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
-        let open = self.work.boundary.as_ref().and_then(|b| b.through(self.graph, self.vertex, a));
-        let limit = open.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        let open = self.from_boundary(&[a], f32::INFINITY, true)?;
+        let limit = open.first().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);
         routes.extend(self.both_ways(a, limit)?);
         Ok(())
@@ -224,12 +224,13 @@ impl LoopSearch<'_> {
         routes: &mut Vec<Route>,
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<(), Stop> {
-        if let Some(boundary) = &self.work.boundary {
-            let out = self.graph.leaving(self.vertex).filter(|&a| self.mask.is_open(a));
-            routes.extend(out.filter_map(|a| boundary.through(self.graph, self.vertex, a)));
-        }
+        let out: Vec<State> = self.graph.leaving(self.vertex).collect();
+        routes.extend(self.from_boundary(&out, f32::INFINITY, true)?);
         let best = self.cheapest(routes, &mut watch)?;
-        if self.factor > 1.0 {
+        if self.factor > 1.0
+            && let Some(cost) = best.as_ref().map(|r| r.cost)
+        {
+            routes.extend(self.from_boundary(&out, cost * self.slack(), false)?);
             self.dearer(best, routes)?;
         }
         Ok(())

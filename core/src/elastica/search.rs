@@ -15,9 +15,9 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
-use super::boundary::BoundaryField;
+use super::boundary::ExitMemory;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::stars::Fan;
@@ -165,7 +165,7 @@ pub struct SearchWorkspace {
     pub(super) out: Vec<Field>,
     pub(super) home: Vec<Field>,
     pub(super) ahead: Vec<Field>,
-    pub(super) boundary: Option<Arc<BoundaryField>>,
+    pub(super) exits: ExitMemory,
 }
 
 impl SearchWorkspace {
@@ -174,9 +174,9 @@ impl SearchWorkspace {
         Self::default()
     }
 
-    /// A workspace for another thread that shares what [`Self::prepare`] has made.
+    /// A workspace for another thread. What [`Self::prepare`] makes belongs to the graph and serves both.
     pub fn sharing(&self) -> Self {
-        Self { boundary: self.boundary.clone(), ..Self::default() }
+        Self::default()
     }
 }
 

@@ -9,7 +9,7 @@
 
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
-use super::search::{Field, LoopSearch, Meter, Route, SearchWorkspace, Stop};
+use super::search::{Field, LoopSearch, Meter, Route, Stop};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
@@ -29,24 +29,17 @@ pub(super) struct ExitMemory {
     raised: Field,
 }
 
-impl SearchWorkspace {
-    /// Makes sure that what searches in a graph have in common is there. The first search does it too; on a large open
-    /// mesh it takes about a second, once for a graph, which may be spent beforehand. Does nothing on a closed surface.
+impl ElasticaGraph {
+    /// Makes what all searches on an open surface need. The first search does it too; on a large mesh it takes about a
+    /// second, once for a graph, which may be spent beforehand. Does nothing on a closed surface.
     ///
     /// # Errors
     ///
     /// When cancelled.
-    pub fn prepare(
-        &mut self,
-        graph: &ElasticaGraph,
-        _mask: &DirectionMask,
-        progress: &Progress,
-    ) -> Result<(), Cancelled> {
-        graph.ways_out(progress).map(|_| ())
+    pub fn prepare(&self, progress: &Progress) -> Result<(), Cancelled> {
+        self.ways_out(progress).map(|_| ())
     }
-}
 
-impl ElasticaGraph {
     /// Per state the least cost from its middle to the boundary, with no direction closed; `None` on a closed surface.
     pub(super) fn ways_out(&self, progress: &Progress) -> Result<Option<&[f32]>, Cancelled> {
         if !self.has_boundary {
@@ -269,12 +262,7 @@ fn bound(least: &[f32], raised: &Field, e: State) -> f32 {
 
 impl LoopSearch<'_> {
     /// The cheapest curves from boundary to boundary; see [`Exits::through`]. None on a closed surface.
-    pub(super) fn from_boundary(
-        &mut self,
-        starts: &[State],
-        limit: f32,
-        only_better: bool,
-    ) -> Result<Vec<Route>, Stop> {
+    pub(super) fn open_curves(&mut self, starts: &[State], limit: f32, only_better: bool) -> Result<Vec<Route>, Stop> {
         let open = starts.iter().copied().filter(|&a| self.mask.is_open(a));
         match Exits::new(self.graph, self.mask, &mut self.work.exits, self.meter.progress)? {
             Some(mut exits) => exits.through(self.vertex, open, limit, only_better, &mut self.meter),

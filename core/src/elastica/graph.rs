@@ -269,7 +269,9 @@ impl ElasticaGraph {
 
     /// Bytes held, without the mesh.
     pub fn bytes(&self) -> usize {
-        self.n_states() * (size_of::<Node>() + size_of::<Window>() + 8) + self.middle.len() * 8 + self.mesh.n_halfedges() * 8
+        self.n_states() * (size_of::<Node>() + size_of::<Window>() + 8)
+            + self.middle.len() * 8
+            + self.mesh.n_halfedges() * 8
     }
 
     /// The options it was built with.

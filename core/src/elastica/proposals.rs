@@ -121,7 +121,7 @@ impl ElasticaGraph {
         progress: &Progress,
         watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<Proposals, Cancelled> {
-        work.prepare(self, query.mask, progress)?;
+        self.prepare(progress)?;
         let mut search = LoopSearch {
             graph: self,
             mask: query.mask,
@@ -211,7 +211,7 @@ impl LoopSearch<'_> {
     /// The cheapest loop along the state nearest to `direction`.
     fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
         let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
-        let open = self.from_boundary(&[a], f32::INFINITY, true)?;
+        let open = self.open_curves(&[a], f32::INFINITY, true)?;
         let limit = open.first().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);
         routes.extend(self.both_ways(a, limit)?);
@@ -225,12 +225,12 @@ impl LoopSearch<'_> {
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<(), Stop> {
         let out: Vec<State> = self.graph.leaving(self.vertex).collect();
-        routes.extend(self.from_boundary(&out, f32::INFINITY, true)?);
+        routes.extend(self.open_curves(&out, f32::INFINITY, true)?);
         let best = self.cheapest(routes, &mut watch)?;
         if self.factor > 1.0
             && let Some(cost) = best.as_ref().map(|r| r.cost)
         {
-            routes.extend(self.from_boundary(&out, cost * self.slack(), false)?);
+            routes.extend(self.open_curves(&out, cost * self.slack(), false)?);
             self.dearer(best, routes)?;
         }
         Ok(())

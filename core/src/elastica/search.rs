@@ -173,11 +173,6 @@ impl SearchWorkspace {
     pub fn new() -> Self {
         Self::default()
     }
-
-    /// A workspace for another thread. What [`Self::prepare`] makes belongs to the graph and serves both.
-    pub fn sharing(&self) -> Self {
-        Self::default()
-    }
 }
 
 /// Why a search ended early.
@@ -260,12 +255,7 @@ impl LoopSearch<'_> {
 
     /// Step 1: lets the ball grow as far as loops of up to `factor` times the cost of `best` need it, and improves
     /// `best`. With `pause` it comes back early, so many states after there is a loop at all.
-    pub(super) fn ball(
-        &mut self,
-        best: &mut Option<Route>,
-        factor: f32,
-        pause: Option<u64>,
-    ) -> Result<Ball, Stop> {
+    pub(super) fn ball(&mut self, best: &mut Option<Route>, factor: f32, pause: Option<u64>) -> Result<Ball, Stop> {
         let graph = self.graph;
         let first = graph.leaving(self.vertex).start;
         let mut cost = best.as_ref().map_or(f32::INFINITY, |r| r.cost);
@@ -301,8 +291,7 @@ impl LoopSearch<'_> {
                 let total = reached + root.dist(back);
                 if total < cost {
                     let (before, other) = root.parent(back);
-                    let (start, last) =
-                        (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
+                    let (start, last) = (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
                     if graph.follows(last, start) && total + graph.step(last, start) < cost {
                         patience = patience.or(pause);
                         (cost, meet) = (total + graph.step(last, start), Some((e, back, before)));

@@ -98,3 +98,27 @@ impl RecentSearches {
         if loops.is_empty() { searched(&woven.spine_mask, &mut self.beside) } else { Ok(loops) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+    use crate::surface::SurfacePoint;
+    use crate::weave::{MeshSource, Options, Session};
+
+    #[test]
+    fn what_was_found_is_remembered_until_the_strips_change() {
+        let progress = Progress::new();
+        let source = MeshSource::Builtin("torus".into());
+        let mut session = Session::open(builtin("torus").unwrap(), source, Options::default(), &progress).unwrap();
+        let at = SurfacePoint { face: crate::mesh::FaceId(100), weights: [0.8, 0.1, 0.1] };
+        let mut handed = Vec::new();
+        let first = session.proposals_with(at, &progress, |p| handed.push(p)).unwrap();
+        assert!(handed.len() >= 2 && handed.last() == first.first());
+        handed.clear();
+        assert_eq!(session.proposals_with(at, &progress, |p| handed.push(p)).unwrap(), first);
+        assert_eq!(handed, first[..1]);
+        session.place(first[0].clone(), &progress).unwrap();
+        assert_ne!(session.proposals(at, &progress).unwrap(), first);
+    }
+}

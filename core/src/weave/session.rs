@@ -12,7 +12,7 @@ use super::recent::RecentSearches;
 use super::suggest::Stuck;
 use super::woven::Woven;
 use crate::dual::{Arrangement, ArrangementError};
-use crate::elastica::{Certainty, ElasticaError, ElasticaGraph, FoundLoop, SearchWorkspace};
+use crate::elastica::{Certainty, ElasticaError, ElasticaGraph, FoundLoop};
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
 use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
@@ -208,13 +208,6 @@ impl Session {
         let done = found.first().is_some_and(|l| known.as_ref() == Some(&l.curve));
         let rest: Vec<_> = found.par_iter().skip(usize::from(done)).map(polished).collect();
         smooth.filter(|_| done).into_iter().chain(rest).collect()
-    }
-
-    /// A workspace that shares what searches with the present mask have to prepare on open surfaces.
-    pub(super) fn prepared_workspace(&mut self, progress: &Progress) -> Result<SearchWorkspace, Cancelled> {
-        let workspace = &mut self.recent.workspace;
-        workspace.prepare(&self.model.graph, &self.woven.mask, progress)?;
-        Ok(workspace.sharing())
     }
 
     /// Places a strip.

@@ -62,7 +62,7 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
     let progress = Progress::new();
     let mut work = SearchWorkspace::new();
     let start = Instant::now();
-    work.prepare(&model.graph, mask, &progress)?;
+    model.graph.prepare(&progress)?;
     if !model.topology.boundary_loops.is_empty() {
         report.add_times(group, "ways to the boundary, once", &[start.elapsed()]);
     }
@@ -74,10 +74,9 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
         let now = Instant::now();
         let mut shown = None;
         let query = ProposalQuery::cheapest(vertex, mask);
-        let best =
-            model.graph.proposals_with(&query, &mut work, &progress, |_, l| {
-                shown.get_or_insert((now.elapsed(), l.cost));
-            })?;
+        let best = model.graph.proposals_with(&query, &mut work, &progress, |_, l| {
+            shown.get_or_insert((now.elapsed(), l.cost));
+        })?;
         figures.proved.push(now.elapsed());
         figures.settled.push(best.settled as f64);
         let now = Instant::now();

@@ -9,8 +9,8 @@ program=${1:-$root/target/debug/plait}
 
 # Millions of instructions, on the built-in creature, and by how many percent they may be exceeded: compilers and the
 # vector units that a processor offers make a difference of some percent.
-hover=2181
-strips=815
+hover=1616
+strips=816
 margin=25
 
 if ! command -v valgrind >/dev/null; then

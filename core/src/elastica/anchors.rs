@@ -15,7 +15,7 @@
 
 use glam::DVec3;
 
-use super::boundary::BoundaryField;
+use super::boundary::{Exit, Exits};
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::proposals::Proposals;
@@ -62,10 +62,10 @@ impl ElasticaGraph {
         work: &mut SearchWorkspace,
         progress: &Progress,
     ) -> Result<Proposals, Cancelled> {
-        work.prepare(self, query.mask, progress)?;
         let mut meter = Meter { progress, budget: query.budget, settled: 0 };
         let mut best = None;
-        let outcome = Round::new(self, query, work).map_or(Ok(()), |mut r| r.solve(&mut meter, &mut best));
+        let outcome = Round::new(self, query, work, &mut meter)
+            .and_then(|round| round.map_or(Ok(()), |mut r| r.solve(&mut meter, &mut best)));
         if outcome == Err(Stop::Cancelled) {
             return Err(Cancelled);
         }
@@ -107,7 +107,12 @@ struct Round<'a> {
 }
 
 impl<'a> Round<'a> {
-    fn new(graph: &'a ElasticaGraph, query: &AnchorQuery<'a>, work: &'a mut SearchWorkspace) -> Option<Self> {
+    fn new(
+        graph: &'a ElasticaGraph,
+        query: &AnchorQuery<'a>,
+        work: &'a mut SearchWorkspace,
+        meter: &mut Meter,
+    ) -> Result<Option<Self>, Stop> {
         let mask = query.mask;
         let mut gates: Vec<Vec<State>> = query
             .anchors
@@ -117,22 +122,22 @@ impl<'a> Round<'a> {
                 None => graph.leaving(a.vertex).filter(|&e| mask.is_open(e)).collect(),
             })
             .collect();
-        let start = (0..gates.len()).min_by_key(|&i| gates[i].len())?;
-        if gates[start].is_empty() {
-            return None;
-        }
-        let SearchWorkspace { out, home, ahead, boundary, .. } = work;
+        let start = (0..gates.len()).min_by_key(|&i| gates[i].len());
+        let Some(start) = start.filter(|&i| !gates[i].is_empty()) else { return Ok(None) };
+        let SearchWorkspace { out, home, ahead, exits, .. } = work;
         let n = gates.len();
         for legs in [&mut *out, &mut *home, &mut *ahead] {
             legs.resize_with(n.max(legs.len()), Field::default);
         }
-        let open = boundary.as_ref().map(|b| Passage { graph, mask, gates: &gates, boundary: b });
-        let open = open.and_then(|p| p.cheapest(&mut ahead[..n]));
+        let open = match Exits::new(graph, mask, exits, meter.progress)? {
+            Some(exits) => Passage { graph, mask, gates: &gates, exits }.cheapest(&mut ahead[..n], meter)?,
+            None => None,
+        };
         gates.rotate_left(start);
         let rounds = vec![f32::INFINITY; gates[0].len()];
         let (out, home, ahead) = (&mut out[..n], &mut home[..n], &mut ahead[..n]);
         let (bounds, radii) = (vec![0.0; n], vec![0.0; n]);
-        Some(Self { graph, mask, gates, bounds, out, radii, home, ahead, rounds, open })
+        Ok(Some(Self { graph, mask, gates, bounds, out, radii, home, ahead, rounds, open }))
     }
 
     fn solve(&mut self, meter: &mut Meter, best: &mut Option<Route>) -> Result<(), Stop> {
@@ -218,10 +223,7 @@ impl<'a> Round<'a> {
             self.home[last].push(0.0, source);
         }
         while let Some(leg) = earliest(self.home) {
-            let Some((d, y)) = self.home[leg].pop() else { break };
-            if !self.home[leg].settle(d, y) {
-                continue;
-            }
+            let Some((d, y)) = self.home[leg].settle() else { continue };
             meter.tick()?;
             for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
                 let reached = d + graph.step(y, z);
@@ -246,7 +248,7 @@ impl<'a> Round<'a> {
         if reached + before >= limit {
             return false;
         }
-        if reached < self.home[leg].dist(z) {
+        if self.home[leg].improves(z, reached) {
             self.home[leg].set(z, reached, NO_STATE, 0);
             self.home[leg].push(reached, z);
         }
@@ -273,13 +275,13 @@ impl<'a> Round<'a> {
                 // Once the next anchor can be left, it is never cheaper to stay on this leg.
                 let to = if leg + 1 < n && position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
                 let key = reached + self.home[to].settled(graph.reverse[f as usize]);
-                if key < cost && reached < ahead[to].dist(f) {
+                if key < cost && ahead[to].improves(f, reached) {
                     ahead[to].set(f, reached, parent, leg as u16);
                     ahead[to].push(key, f);
                 }
             }
             let Some(next) = earliest(ahead) else { break };
-            let Some((key, s)) = ahead[next].pop_fresh() else { continue };
+            let Some((key, s)) = ahead[next].settle() else { continue };
             if key >= cost {
                 break;
             }
@@ -301,19 +303,18 @@ fn expand(
     meter: &mut Meter,
     mut reach: impl FnMut(State, f32),
 ) -> Result<(), Stop> {
-    let Some((d, e)) = field.pop() else { return Ok(()) };
-    if !field.settle(d, e) {
-        return Ok(());
-    }
+    let Some((d, e)) = field.settle() else { return Ok(()) };
     meter.tick()?;
-    for f in graph.successors(e).filter(|&f| mask.is_open(f)) {
-        let reached = d + graph.step(e, f);
-        reach(f, reached);
-        if reached < field.dist(f) {
-            field.set(f, reached, e, 0);
-            field.push(reached, f);
+    graph.expand(e, |f, step| {
+        let reached = d + step;
+        if mask.is_open(f) {
+            reach(f, reached);
+            if field.improves(f, reached) {
+                field.set(f, reached, e, 0);
+                field.push(reached, f);
+            }
         }
-    }
+    });
     Ok(())
 }
 
@@ -348,52 +349,52 @@ struct Passage<'a> {
     graph: &'a ElasticaGraph,
     mask: &'a DirectionMask,
     gates: &'a [Vec<State>],
-    boundary: &'a BoundaryField,
+    exits: Exits<'a>,
 }
 
 impl Passage<'_> {
-    fn cheapest(&self, legs: &mut [Field]) -> Option<Route> {
+    fn cheapest(&mut self, legs: &mut [Field], meter: &mut Meter) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
         let last = legs.len() - 1;
         legs.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
+        let mut ins: Vec<Option<Exit>> = Vec::new();
         for &b in &self.gates[0] {
-            let cost = self.boundary.field.dist(b);
-            if cost.is_finite() {
+            let way = self.exits.way(graph.reverse[b as usize], f32::INFINITY, meter)?;
+            if let Some((cost, _)) = way {
                 legs[0].set(b, cost, NO_STATE, 0);
                 legs[0].push(cost, b);
             }
+            ins.push(way);
         }
         let (mut cost, mut end) = (f32::INFINITY, None);
         while let Some(leg) = earliest(legs) {
-            let Some((d, e)) = legs[leg].pop() else { continue };
+            let Some((d, e)) = legs[leg].settle() else { continue };
             if d >= cost {
                 break;
             }
-            if !legs[leg].settle(d, e) {
-                continue;
-            }
             if leg == last {
-                let total = d + self.boundary.home(graph, e);
-                if total < cost {
-                    (cost, end) = (total, Some(e));
+                if let Some((more, out)) = self.exits.way(e, cost - d, meter)? {
+                    (cost, end) = (d + more, Some((e, out)));
                 }
                 continue;
             }
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
+            meter.tick()?;
+            graph.expand(e, |f, step| {
+                let reached = d + step;
                 let to = if position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
-                if reached < legs[to].dist(f) {
+                if legs[to].improves(f, reached) && self.mask.is_open(f) {
                     legs[to].set(f, reached, e, leg as u16);
                     legs[to].push(reached, f);
                 }
-            }
+            });
         }
-        let a = end?;
+        let Some((a, out)) = end else { return Ok(None) };
         let passed = chain(legs, last, a);
-        let mut states = self.boundary.field.chain(*passed.first()?);
+        let first = passed.first().and_then(|&b| position(&self.gates[0], b));
+        let Some((_, back)) = first.and_then(|i| ins[i].take()) else { return Ok(None) };
+        let mut states: Vec<State> = back.iter().rev().map(|&s| graph.reverse[s as usize]).collect();
         states.extend(&passed[1..]);
-        let out = self.boundary.field.chain(graph.reverse[a as usize]);
-        states.extend(out.iter().rev().skip(1).map(|&s| graph.reverse[s as usize]));
-        Some(Route { cost, states, closed: false })
+        states.extend(&out[1..]);
+        Ok(Some(Route { cost, states, closed: false }))
     }
 }

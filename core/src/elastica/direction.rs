@@ -16,18 +16,14 @@ impl ElasticaGraph {
             field.push(0.0, a);
         }
         let mut farthest = 0.0;
-        while let Some((d, e)) = field.pop() {
-            if !field.settle(d, e) {
-                continue;
-            }
+        while let Some((d, e)) = field.settle() {
             farthest = d;
-            for f in self.successors(e) {
-                let reached = d + self.step(e, f);
-                if reached < field.dist(f) {
-                    field.set(f, reached, e, 0);
-                    field.push(reached, f);
+            self.expand(e, |f, step| {
+                if field.improves(f, d + step) {
+                    field.set(f, d + step, e, 0);
+                    field.push(d + step, f);
                 }
-            }
+            });
         }
         f64::from(farthest)
     }
@@ -48,23 +44,21 @@ impl LoopSearch<'_> {
         while root.top() + far.top() < cost {
             let forwards = root.top() <= far.top();
             let (near, other) = if forwards { (&mut *root, &*far) } else { (&mut *far, &*root) };
-            let Some((d, e)) = near.pop() else { break };
-            if !near.settle(d, e) {
-                continue;
-            }
+            let Some((d, e)) = near.settle() else { break };
             self.meter.tick()?;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if !near.improves(f, reached) || !self.mask.is_open(f) {
+                    return;
+                }
+                near.set(f, reached, e, 0);
+                near.push(reached, f);
                 let back = graph.reverse[f as usize];
                 let total = reached + other.dist(back);
                 if total < cost {
                     (cost, meet) = (total, Some(if forwards { (e, back) } else { (back, e) }));
                 }
-                if reached < near.dist(f) {
-                    near.set(f, reached, e, 0);
-                    near.push(reached, f);
-                }
-            }
+            });
         }
         let Some((e, back)) = meet else { return Ok(None) };
         let mut states = root.chain(e);

@@ -36,6 +36,7 @@ pub(super) struct Pair {
     pub(super) middle_face: u32,
     pub(super) middle_angle: f32,
 }
+
 /// The rings around a vertex, with marks that are reused.
 struct Rings {
     mark: Vec<u32>,
@@ -75,16 +76,15 @@ pub(super) fn geodesics(
     progress: &Progress,
 ) -> Result<Vec<Pair>, Cancelled> {
     let n = mesh.n_vertices();
+    let memory = || (Rings { mark: vec![u32::MAX; n], members: Vec::new() }, Unfolding::default());
     let chunks: Vec<(Vec<Pair>, Vec<f32>)> = (0..n.div_ceil(CHUNK))
         .into_par_iter()
-        .map(|c| {
+        .map_init(memory, |(ring, work), c| {
             progress.check()?;
-            let mut ring = Rings { mark: vec![u32::MAX; n], members: Vec::new() };
-            let mut work = Unfolding::default();
             let (mut pairs, mut limits) = (Vec::new(), Vec::new());
             for v in (c * CHUNK..((c + 1) * CHUNK).min(n)).map(VertexId::new) {
                 ring.gather(mesh, v, rings);
-                limits.push(from_vertex(mesh, corners, weights, v, &ring, &mut work, &mut pairs));
+                limits.push(from_vertex(mesh, corners, weights, v, ring, work, &mut pairs));
             }
             Ok((pairs, limits))
         })
@@ -153,7 +153,7 @@ fn from_vertex(
         };
         pairs.push(Pair {
             ends: [v.0, g.target.0],
-            angles: [angle(g.start, g.start_angle) as f32, angle(g.end, g.end_angle) as f32],
+            angles: [angle(g.start, g.start_angle()) as f32, angle(g.end, g.end_angle()) as f32],
             length: g.length.max(MIN_LENGTH) as f32,
             alignment: weights.of_geodesic(v, g, &crossings) as f32,
             middle_face: middle_face.0,
@@ -168,7 +168,7 @@ fn middle(mesh: &TriMesh, g: &Geodesic, crossings: &[EdgeCrossing]) -> (FaceId, 
     let half = 0.5 * g.length;
     let (h, angle) = match crossings.iter().find(|c| c.distance >= half) {
         Some(c) => (c.halfedge, c.angle),
-        None => (g.end, g.end_angle + PI),
+        None => (g.end, g.end_angle() + PI),
     };
     (mesh.face(h), side_angle(mesh, h) + angle)
 }

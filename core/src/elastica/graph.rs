@@ -11,7 +11,7 @@
 
 use std::f32::consts::PI;
 use std::f64::consts::FRAC_PI_2;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -86,6 +86,9 @@ pub enum ElasticaError {
     TooLarge,
 }
 
+/// How many places before the one computed the first allowed turn is looked for: rounding moves it by one at most.
+const NEARLY: usize = 2;
+
 /// What a step reads of a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
@@ -95,6 +98,18 @@ pub(super) struct Node {
     back: f32,
     pub(super) length: f32,
     pub(super) alignment: f32,
+}
+
+/// The states that may follow a state: a range around its end, which may be wrapped.
+#[derive(Debug, Clone, Copy, Default)]
+struct Window {
+    /// The first of them.
+    start: State,
+    /// Its position among the states of the vertex.
+    offset: u16,
+    count: u16,
+    /// How many of them are the first states of the vertex.
+    wrapped: u16,
 }
 
 /// The graph `g` of a mesh, with the turns of `g′` as ranges.
@@ -110,11 +125,12 @@ pub struct ElasticaGraph {
     pub(super) nodes: Vec<Node>,
     pub(super) target: Vec<u32>,
     pub(super) reverse: Vec<State>,
-    /// Per state: where among the states of its end its successors begin, and how many they are.
-    window: Vec<(u16, u16)>,
+    window: Vec<Window>,
     /// Middle of each geodesic, by face: first entry of each face, then state and angle in the face.
     pub(super) middle_first: Vec<u32>,
     pub(super) middle: Vec<(State, f32)>,
+    /// Per state the least cost of a way to the boundary, once it was asked for.
+    pub(super) ways_out: OnceLock<Vec<f32>>,
 }
 
 impl ElasticaGraph {
@@ -170,10 +186,16 @@ impl ElasticaGraph {
             }
         }
         let angle = |way: u32| pairs[way as usize / 2].angles[way as usize % 2];
+        let mut around = Vec::with_capacity(mesh.n_vertices());
+        let mut rest = &mut ways[..];
         for v in 0..mesh.n_vertices() {
-            ways[first[v] as usize..first[v + 1] as usize]
-                .sort_unstable_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b)));
+            let (here, after) = rest.split_at_mut((first[v + 1] - first[v]) as usize);
+            around.push(here);
+            rest = after;
         }
+        around
+            .into_par_iter()
+            .for_each(|here| here.sort_unstable_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b))));
         let mut place = vec![0u32; ways.len()];
         for (state, &way) in ways.iter().enumerate() {
             place[way as usize] = state as u32;
@@ -199,27 +221,35 @@ impl ElasticaGraph {
             window: Vec::new(),
             middle_first,
             middle,
+            ways_out: OnceLock::new(),
         };
         graph.window = (0..graph.n_states()).into_par_iter().map(|e| graph.find_window(e as State)).collect();
         graph
     }
 
-    fn find_window(&self, e: State) -> (u16, u16) {
+    fn find_window(&self, e: State) -> Window {
         let states = self.leaving(VertexId(self.target[e as usize]));
         let n = (states.end - states.start) as usize;
         let max_turn = self.options.max_turn as f32;
         let allowed = |i: usize| self.turn(e, states.start + (i % n) as u32) <= max_turn;
-        let Some(start) = (0..n).find(|&i| allowed(i) && !allowed(i + n - 1)) else {
-            return (0, if n > 0 && allowed(0) { n as u16 } else { 0 });
+        // They begin about where the largest turn leads to.
+        let lowest = (self.nodes[e as usize].back + PI - max_turn).rem_euclid(2.0 * PI);
+        let around = &self.nodes[states.start as usize..states.end as usize];
+        let about = around.partition_point(|node| node.out < lowest) + n.saturating_sub(NEARLY);
+        let begins = |&i: &usize| allowed(i) && !allowed(i + n - 1);
+        let (offset, count) = match (about..about + n).find(begins) {
+            Some(i) => (i % n, (1..n).find(|&k| !allowed(i + k)).unwrap_or(n)),
+            None => (0, if n > 0 && allowed(0) { n } else { 0 }),
         };
-        let count = (1..n).find(|&i| !allowed(start + i)).unwrap_or(n);
-        (start as u16, count as u16)
+        let wrapped = (offset + count).saturating_sub(n);
+        let start = states.start + offset as u32;
+        Window { start, offset: offset as u16, count: count as u16, wrapped: wrapped as u16 }
     }
 
     /// Turning angle from `e` into `f`, which leaves the end of `e`. The same number from `rev f` into `rev e`.
     #[inline]
     pub(super) fn turn(&self, e: State, f: State) -> f32 {
-        ((self.nodes[f as usize].out - self.nodes[e as usize].back).abs() - PI).abs()
+        turn(&self.nodes[e as usize], &self.nodes[f as usize])
     }
 
     /// The mesh the graph lies on.
@@ -234,12 +264,14 @@ impl ElasticaGraph {
 
     /// Number of steps between states.
     pub fn n_steps(&self) -> usize {
-        self.window.iter().map(|w| w.1 as usize).sum()
+        self.window.iter().map(|w| w.count as usize).sum()
     }
 
     /// Bytes held, without the mesh.
     pub fn bytes(&self) -> usize {
-        self.n_states() * (size_of::<Node>() + 8 + 4) + self.middle.len() * 8 + self.mesh.n_halfedges() * 8
+        self.n_states() * (size_of::<Node>() + size_of::<Window>() + 8)
+            + self.middle.len() * 8
+            + self.mesh.n_halfedges() * 8
     }
 
     /// The options it was built with.
@@ -256,12 +288,25 @@ impl ElasticaGraph {
     /// The states that may follow `e`.
     #[inline]
     pub(super) fn successors(&self, e: State) -> impl Iterator<Item = State> + use<> {
-        let at = self.target[e as usize] as usize;
-        let (first, end) = (self.first[at], self.first[at + 1]);
-        let (offset, count) = self.window[e as usize];
-        let start = first + u32::from(offset);
-        let wrapped = (start + u32::from(count)).saturating_sub(end);
-        (start..start + u32::from(count) - wrapped).chain(first..first + wrapped)
+        let Window { start, offset, count, wrapped } = self.window[e as usize];
+        let first = start - u32::from(offset);
+        (start..start + u32::from(count - wrapped)).chain(first..first + u32::from(wrapped))
+    }
+
+    /// Shows every state that may follow `e`, and the price of that step, to `visit`.
+    #[inline]
+    pub(super) fn expand(&self, e: State, mut visit: impl FnMut(State, f32)) {
+        let (alpha, beta) = (self.options.alpha as f32, self.options.beta as f32);
+        let from = &self.nodes[e as usize];
+        let window = &self.window[e as usize];
+        let first = window.start - u32::from(window.offset);
+        let wrapped = u32::from(window.wrapped);
+        for (start, count) in [(window.start, u32::from(window.count) - wrapped), (first, wrapped)] {
+            for (f, to) in (start..).zip(&self.nodes[start as usize..(start + count) as usize]) {
+                let [length, alignment, bending] = price(from, to, alpha, beta);
+                visit(f, length + alignment + bending);
+            }
+        }
     }
 
     /// Whether `f` may follow `e`.
@@ -273,15 +318,8 @@ impl ElasticaGraph {
     /// Parts of the price of the step from `e` into `f`: length, alignment and bending, weighted.
     #[inline]
     pub(super) fn step_parts(&self, e: State, f: State) -> [f32; 3] {
-        let (a, b) = (&self.nodes[e as usize], &self.nodes[f as usize]);
-        let turn = self.turn(e, f);
-        let least = a.length.min(b.length);
-        // ½γ / tan ½γ by its series; the next term is below 1e-6 at 30°.
-        let x = 0.25 * turn * turn;
-        let arc = 1.0 - x * (1.0 / 3.0 + x * (1.0 / 45.0 + x * (2.0 / 945.0)));
-        let length = arc * least + 0.5 * (a.length - b.length).abs();
-        let alignment = self.options.alpha as f32 * 0.5 * (a.alignment + b.alignment) * length;
-        [length, alignment, self.options.beta as f32 * turn * turn / least]
+        let (alpha, beta) = (self.options.alpha as f32, self.options.beta as f32);
+        price(&self.nodes[e as usize], &self.nodes[f as usize], alpha, beta)
     }
 
     /// Price of the step from `e` into `f`.
@@ -316,6 +354,25 @@ impl ElasticaGraph {
         let (h, local) = self.corners.locate(&self.mesh, self.origin(e), self.out_angle(e));
         direction_in_face(&self.mesh, h, local)
     }
+}
+
+#[inline]
+fn turn(from: &Node, to: &Node) -> f32 {
+    ((to.out - from.back).abs() - PI).abs()
+}
+
+/// Parts of the price of a step: length, alignment and bending, weighted.
+#[inline]
+fn price(a: &Node, b: &Node, alpha: f32, beta: f32) -> [f32; 3] {
+    let turn = turn(a, b);
+    // Not `min`, whose care for what is not a number costs.
+    let least = if a.length < b.length { a.length } else { b.length };
+    // ½γ / tan ½γ by its series; the next term is below 1e-6 at 30°.
+    let x = 0.25 * turn * turn;
+    let arc = 1.0 - x * (1.0 / 3.0 + x * (1.0 / 45.0 + x * (2.0 / 945.0)));
+    let length = arc * least + 0.5 * (a.length - b.length).abs();
+    let alignment = alpha * 0.5 * (a.alignment + b.alignment) * length;
+    [length, alignment, beta * turn * turn / least]
 }
 
 fn check_length(given: usize, expected: usize) -> Result<(), ElasticaError> {

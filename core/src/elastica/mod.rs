@@ -18,10 +18,11 @@ mod stars;
 mod tests;
 mod trace;
 mod unfold;
+mod vicinity;
 mod weights;
 
 pub use anchors::{Anchor, AnchorQuery};
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
 pub use mask::DirectionMask;
-pub use proposals::{FoundLoop, ProposalQuery, Proposals};
+pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals};
 pub use search::SearchWorkspace;

@@ -1,14 +1,12 @@
 //! Loops proposed at a point: the cheapest, and alternatives in order of cost.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use glam::DVec3;
 
 use super::graph::{ElasticaGraph, State};
 use super::mask::DirectionMask;
-use super::search::{LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
-use crate::mesh::{TriMesh, VertexId};
+use super::search::{Ball, LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
+use super::vicinity::Vicinity;
+use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::surface::SurfaceCurve;
 
@@ -18,6 +16,19 @@ const SAME_LENGTH: f64 = 1.3;
 
 /// Where the cheapest route shrinks to a point as a curve, the next ones up to this multiple of its cost are tried.
 const FALLBACK_FACTOR: f64 = 2.0;
+
+/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about two
+/// milliseconds, in which most loops found first give way to better ones.
+const PATIENCE: u64 = 4000;
+
+/// What is known of a loop that is handed out early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Certainty {
+    /// It is the cheapest so far; usually it is the cheapest of all, or costs a few percent more.
+    Found,
+    /// It is the cheapest of all.
+    Proved,
+}
 
 /// What loops are wanted.
 #[derive(Debug, Clone, Copy)]
@@ -93,11 +104,12 @@ impl ElasticaGraph {
         work: &mut SearchWorkspace,
         progress: &Progress,
     ) -> Result<Proposals, Cancelled> {
-        self.proposals_with(query, work, progress, |_| {})
+        self.proposals_with(query, work, progress, |_, _| {})
     }
 
-    /// Like [`Self::proposals`], and hands the first loop found to `first` before it is proved to be the cheapest.
-    /// Usually it is, or costs a few percent more.
+    /// Like [`Self::proposals`], and hands loops to `watch` as soon as they are there: the first one found, perhaps
+    /// a better one, and the cheapest when it is proved to be that, before alternatives are looked for. The same loop
+    /// comes twice if what was found is then proved.
     ///
     /// # Errors
     ///
@@ -107,9 +119,9 @@ impl ElasticaGraph {
         query: &ProposalQuery,
         work: &mut SearchWorkspace,
         progress: &Progress,
-        first: impl FnMut(&FoundLoop),
+        watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<Proposals, Cancelled> {
-        work.prepare(self, query.mask, progress)?;
+        self.prepare(progress)?;
         let mut search = LoopSearch {
             graph: self,
             mask: query.mask,
@@ -121,7 +133,7 @@ impl ElasticaGraph {
         let mut routes = Vec::new();
         let outcome = match query.direction {
             Some(direction) => search.along(direction, &mut routes),
-            None => search.all(&mut routes, first),
+            None => search.all(&mut routes, watch),
         };
         let proved = match outcome {
             Ok(()) => true,
@@ -130,7 +142,7 @@ impl ElasticaGraph {
         };
         let settled = search.meter.settled;
         let any = !routes.is_empty();
-        let loops = self.distinct(routes, query);
+        let loops = self.distinct(routes, query, &mut work.vicinity);
         if loops.is_empty() && any && query.direction.is_none() && query.factor < FALLBACK_FACTOR {
             return self.proposals(&ProposalQuery { factor: FALLBACK_FACTOR, ..*query }, work, progress);
         }
@@ -138,28 +150,28 @@ impl ElasticaGraph {
     }
 
     /// The cheapest of `routes` that are curves and not copies of one another.
-    fn distinct(&self, mut routes: Vec<Route>, query: &ProposalQuery) -> Vec<FoundLoop> {
+    fn distinct(&self, mut routes: Vec<Route>, query: &ProposalQuery, vicinity: &mut Vicinity) -> Vec<FoundLoop> {
         routes.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.states.cmp(&b.states)));
         let Some(limit) = routes.first().map(|r| r.cost * query.factor.max(1.0) as f32 * ROUNDING) else {
             return Vec::new();
         };
-        let mut found: Vec<(FoundLoop, Tube)> = Vec::new();
+        let mut found: Vec<(FoundLoop, Vec<VertexId>)> = Vec::new();
         for route in routes.iter().take_while(|r| r.cost <= limit) {
             if found.len() >= query.max {
                 break;
             }
-            let known = |l: &FoundLoop, tube: &Tube| {
+            let known = |l: &FoundLoop, near: &[VertexId]| {
                 let ratio = self.parts(route)[0] / l.length;
                 (1.0 / SAME_LENGTH..SAME_LENGTH).contains(&ratio)
                     && l.curve.closed == route.closed
-                    && route.states.iter().all(|&e| tube.contains(self.origin(e)))
+                    && route.states.iter().all(|&e| near.binary_search(&self.origin(e)).is_ok())
             };
-            if found.iter().any(|(l, tube)| known(l, tube)) {
+            if found.iter().any(|(l, near)| known(l, near)) {
                 continue;
             }
             if let Some(curve) = self.found(route) {
-                let tube = Tube::new(&self.mesh, &curve.curve, query.separation);
-                found.push((curve, tube));
+                let near = vicinity.of(&self.mesh, &curve.curve, query.separation);
+                found.push((curve, near));
             }
         }
         found.into_iter().map(|(l, _)| l).collect()
@@ -199,88 +211,83 @@ impl LoopSearch<'_> {
     /// The cheapest loop along the state nearest to `direction`.
     fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
         let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
-        let open = self.work.boundary.as_ref().and_then(|b| b.through(self.graph, self.vertex, a));
-        let limit = open.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        let open = self.open_curves(&[a], f32::INFINITY, true)?;
+        let limit = open.first().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);
         routes.extend(self.both_ways(a, limit)?);
         Ok(())
     }
 
     /// The cheapest route, and those of the other start directions up to the factor.
-    pub(super) fn all(&mut self, routes: &mut Vec<Route>, mut first: impl FnMut(&FoundLoop)) -> Result<(), Stop> {
-        if let Some(boundary) = &self.work.boundary {
-            let out = self.graph.leaving(self.vertex).filter(|&a| self.mask.is_open(a));
-            routes.extend(out.filter_map(|a| boundary.through(self.graph, self.vertex, a)));
-        }
-        let mut best = routes.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
-        let ball = self.ball(&mut best);
-        if let Some(route) = &best {
-            if let Some(l) = self.graph.found(route) {
-                first(&l);
-            }
-            routes.push(route.clone());
-        }
-        ball?;
-        let mut cost = best.map_or(f32::INFINITY, |r| r.cost);
-        self.corridor(cost * self.slack())?;
-        let directions = self.directions(cost * self.slack());
-        let known = routes.len();
-        self.improve(&directions, &mut cost, routes)?;
-        if self.factor > 1.0 {
-            let limit = cost * self.slack();
-            // What was found on the way is the cheapest of its direction; the routes before need not be.
-            let solved = |a: State| routes[known..].iter().any(|r| r.states[0] == a);
-            let rest = directions.iter().filter(|&&(bound, a)| bound < limit && !solved(a)).map(|d| d.1).collect();
-            self.alternatives(rest, limit, routes)?;
+    pub(super) fn all(
+        &mut self,
+        routes: &mut Vec<Route>,
+        mut watch: impl FnMut(Certainty, &FoundLoop),
+    ) -> Result<(), Stop> {
+        let out: Vec<State> = self.graph.leaving(self.vertex).collect();
+        routes.extend(self.open_curves(&out, f32::INFINITY, true)?);
+        let best = self.cheapest(routes, &mut watch)?;
+        if self.factor > 1.0
+            && let Some(cost) = best.as_ref().map(|r| r.cost)
+        {
+            routes.extend(self.open_curves(&out, cost * self.slack(), false)?);
+            self.dearer(best, routes)?;
         }
         Ok(())
     }
 
+    /// The cheapest route, proved; those that it improved on are among `routes`.
+    fn cheapest(
+        &mut self,
+        routes: &mut Vec<Route>,
+        mut watch: impl FnMut(Certainty, &FoundLoop),
+    ) -> Result<Option<Route>, Stop> {
+        let graph = self.graph;
+        let mut show = |certainty, route: &Option<Route>| {
+            if let Some(l) = route.as_ref().and_then(|r| graph.found(r)) {
+                watch(certainty, &l);
+            }
+        };
+        let mut best = routes.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+        self.start();
+        let mut shown = None;
+        let mut patience = Some(PATIENCE);
+        loop {
+            let grown = self.ball(&mut best, 1.0, patience.take());
+            let cost = best.as_ref().map(|r| r.cost);
+            if cost != shown {
+                shown = cost;
+                show(Certainty::Found, &best);
+                routes.extend(best.clone());
+            }
+            if grown? == Ball::Complete {
+                break;
+            }
+        }
+        let mut cost = best.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        self.corridor(cost)?;
+        let directions = self.directions(cost);
+        let known = routes.len();
+        self.improve(&directions, &mut cost, routes)?;
+        let better = routes[known..].iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
+        best = better.or(best);
+        show(Certainty::Proved, &best);
+        Ok(best)
+    }
+
+    /// The cheapest route of each start direction, up to the factor times the cost of `best`.
+    fn dearer(&mut self, mut best: Option<Route>, routes: &mut Vec<Route>) -> Result<(), Stop> {
+        let Some(cost) = best.as_ref().map(|r| r.cost) else { return Ok(()) };
+        let limit = cost * self.slack();
+        self.resume();
+        self.ball(&mut best, self.slack(), None)?;
+        self.corridor(limit)?;
+        let starts = self.directions(limit).into_iter().map(|d| d.1).collect();
+        self.alternatives(starts, limit, routes)
+    }
+
     /// The factor, with room for rounding where costs up to it are wanted.
-    fn slack(&self) -> f32 {
+    pub(super) fn slack(&self) -> f32 {
         if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
-    }
-}
-
-/// The vertices near a curve.
-struct Tube {
-    near: Vec<u64>,
-}
-
-impl Tube {
-    /// The vertices within `radius` of the edges `curve` crosses, measured along edges.
-    fn new(mesh: &TriMesh, curve: &SurfaceCurve, radius: f64) -> Self {
-        let mut dist = vec![f64::INFINITY; mesh.n_vertices()];
-        let mut queue = BinaryHeap::new();
-        for c in &curve.crossings {
-            for v in [mesh.origin(c.halfedge), mesh.target(c.halfedge)] {
-                dist[v.index()] = 0.0;
-                queue.push(Reverse((0u64, v)));
-            }
-        }
-        while let Some(Reverse((key, v))) = queue.pop() {
-            let d = f64::from_bits(key);
-            if d > dist[v.index()] {
-                continue;
-            }
-            for h in mesh.outgoing(v) {
-                for (w, side) in [(mesh.target(h), h), (mesh.opposite(h), mesh.prev(h))] {
-                    let reached = d + mesh.vector(side).length();
-                    if reached < dist[w.index()] && reached <= radius {
-                        dist[w.index()] = reached;
-                        queue.push(Reverse((reached.to_bits(), w)));
-                    }
-                }
-            }
-        }
-        let mut near = vec![0u64; mesh.n_vertices().div_ceil(64)];
-        for (v, _) in dist.iter().enumerate().filter(|(_, d)| d.is_finite()) {
-            near[v / 64] |= 1 << (v % 64);
-        }
-        Self { near }
-    }
-
-    fn contains(&self, v: VertexId) -> bool {
-        self.near[v.index() / 64] >> (v.index() % 64) & 1 == 1
     }
 }

@@ -3,7 +3,8 @@
 //! 1. *Ball*: Dijkstra from all states leaving `v` at once, each label remembering its origin. Where the way out
 //!    of one origin meets the reversed way out of another, both together are a loop, with a corner at `v`. If the
 //!    corner is a turn that is allowed, the loop is real and an upper bound. A loop of cost `C` splits into two
-//!    parts below `C/2`, so the ball needs half the bound as radius.
+//!    parts below `C/2`, so the ball needs half the bound as radius. It stops there and can grow on later, when
+//!    dearer loops are wanted too.
 //! 2. *Corridor*: beyond that radius only states are continued from which the way back is known and the whole
 //!    stays below the bound. Now `D(rev e)` is the exact cheapest way from `e` back to `v`, in any direction, for
 //!    each state that can lie on a loop below the bound.
@@ -14,12 +15,13 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
-use super::boundary::BoundaryField;
+use super::boundary::ExitMemory;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::stars::Fan;
+use super::vicinity::Vicinity;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
@@ -29,60 +31,81 @@ pub(super) const ROUNDING: f32 = 1.0 + 1e-5;
 /// States settled between two looks at the wish to stop: some tenths of a millisecond.
 const CHECK_EVERY: u64 = 1024;
 
-/// What is known of a state in one search.
+/// How a state was reached.
 #[derive(Debug, Clone, Copy, Default)]
-struct Label {
-    dist: f32,
-    /// The search this label belongs to; labels of earlier searches do not exist.
-    stamp: u32,
+struct Trail {
     parent: State,
     /// Index among the states leaving the source; with several legs, the leg of the parent.
     origin: u16,
-    settled: bool,
 }
 
+/// States in the order of a key, as bits above the state.
+type Queue = BinaryHeap<Reverse<u64>>;
+
 /// Tentative distances of one search, with its queue.
+///
+/// A label is a distance as bits, which order like non-negative numbers, below the number of its search. These count
+/// down, by two: labels of earlier searches are larger than any that replaces them, and final ones, which have the
+/// number below, smaller. So one comparison tells whether a label is to be replaced.
 #[derive(Debug, Default)]
 pub(super) struct Field {
-    labels: Vec<Label>,
-    stamp: u32,
-    /// Key as bits, which order like non-negative numbers, above the state.
-    queue: BinaryHeap<Reverse<u64>>,
+    labels: Vec<u64>,
+    trails: Vec<Trail>,
+    /// Of tentative labels.
+    number: u32,
+    queue: Queue,
 }
 
 impl Field {
     /// Forgets everything, without touching it.
     pub(super) fn restart(&mut self, n_states: usize) {
         self.queue.clear();
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.labels.len() != n_states || self.stamp == 0 {
+        if self.labels.len() != n_states || self.number <= 2 {
             self.labels.clear();
-            self.labels.resize(n_states, Label::default());
-            self.stamp = 1;
+            self.labels.resize(n_states, u64::MAX);
+            self.trails.clear();
+            self.trails.resize(n_states, Trail::default());
+            self.number = u32::MAX - 1;
         }
+        self.number -= 2;
     }
 
-    #[inline]
-    fn get(&self, e: State) -> Option<&Label> {
-        let label = &self.labels[e as usize];
-        (label.stamp == self.stamp).then_some(label)
-    }
-
-    /// Tentative distance, infinite where none is known.
+    /// Tentative or final distance, infinite where none is known.
     #[inline]
     pub(super) fn dist(&self, e: State) -> f32 {
-        self.get(e).map_or(f32::INFINITY, |l| l.dist)
+        let label = self.labels[e as usize];
+        if (label >> 32) as u32 <= self.number { f32::from_bits(label as u32) } else { f32::INFINITY }
     }
 
     /// Final distance, infinite where none is known.
     #[inline]
     pub(super) fn settled(&self, e: State) -> f32 {
-        self.get(e).filter(|l| l.settled).map_or(f32::INFINITY, |l| l.dist)
+        let label = self.labels[e as usize];
+        if (label >> 32) as u32 == self.number - 1 { f32::from_bits(label as u32) } else { f32::INFINITY }
+    }
+
+    /// Whether the distance is final.
+    #[inline]
+    pub(super) fn is_settled(&self, e: State) -> bool {
+        (self.labels[e as usize] >> 32) as u32 == self.number - 1
+    }
+
+    #[inline]
+    fn label(&self, dist: f32) -> u64 {
+        u64::from(self.number) << 32 | u64::from(dist.to_bits())
+    }
+
+    /// Whether a distance would replace the one of `e`: that of a settled state stands, as another order of summing
+    /// the same prices must not open it again.
+    #[inline]
+    pub(super) fn improves(&self, e: State, dist: f32) -> bool {
+        self.label(dist) < self.labels[e as usize]
     }
 
     #[inline]
     pub(super) fn set(&mut self, e: State, dist: f32, parent: State, origin: u16) {
-        self.labels[e as usize] = Label { dist, stamp: self.stamp, parent, origin, settled: false };
+        self.labels[e as usize] = self.label(dist);
+        self.trails[e as usize] = Trail { parent, origin };
     }
 
     #[inline]
@@ -90,50 +113,35 @@ impl Field {
         self.queue.push(Reverse(u64::from(key.to_bits()) << 32 | u64::from(e)));
     }
 
+    /// The next state that is not settled, with its key; it is settled now.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<(f32, State)> {
-        self.queue.pop().map(|Reverse(k)| (f32::from_bits((k >> 32) as u32), k as State))
+    pub(super) fn settle(&mut self) -> Option<(f32, State)> {
+        loop {
+            let Reverse(entry) = self.queue.pop()?;
+            let e = entry as State;
+            if !self.is_settled(e) {
+                self.labels[e as usize] -= 1 << 32;
+                return Some((f32::from_bits((entry >> 32) as u32), e));
+            }
+        }
     }
 
     /// Smallest key in the queue, infinite if it is empty.
     #[inline]
     pub(super) fn top(&self) -> f32 {
-        self.queue.peek().map_or(f32::INFINITY, |Reverse(k)| f32::from_bits((k >> 32) as u32))
-    }
-
-    /// Marks a state popped at distance `d` as final; false if that entry is out of date.
-    #[inline]
-    pub(super) fn settle(&mut self, d: f32, e: State) -> bool {
-        let label = &mut self.labels[e as usize];
-        let fresh = !label.settled && d <= label.dist;
-        label.settled |= fresh;
-        fresh
-    }
-
-    /// The next state that was not expanded since it was last set, marked as expanded.
-    #[inline]
-    pub(super) fn pop_fresh(&mut self) -> Option<(f32, State)> {
-        loop {
-            let (key, e) = self.pop()?;
-            let label = &mut self.labels[e as usize];
-            if !label.settled {
-                label.settled = true;
-                return Some((key, e));
-            }
-        }
+        self.queue.peek().map_or(f32::INFINITY, |Reverse(entry)| f32::from_bits((entry >> 32) as u32))
     }
 
     /// The state before `e`, and the tag it was set with.
     pub(super) fn parent(&self, e: State) -> (State, u16) {
-        let label = &self.labels[e as usize];
-        (label.parent, label.origin)
+        let trail = &self.trails[e as usize];
+        (trail.parent, trail.origin)
     }
 
     /// The states from the source to `e`.
     pub(super) fn chain(&self, e: State) -> Vec<State> {
         let mut list: Vec<State> =
-            std::iter::successors(Some(e), |&s| Some(self.labels[s as usize].parent).filter(|&p| p != NO_STATE))
-                .collect();
+            std::iter::successors(Some(e), |&s| Some(self.parent(s).0).filter(|&p| p != NO_STATE)).collect();
         list.reverse();
         list
     }
@@ -143,27 +151,27 @@ impl Field {
 #[derive(Debug, Default)]
 pub struct SearchWorkspace {
     pub(super) root: Field,
+    /// The states settled in the ball, and those in the corridor beyond it.
+    ball: Vec<State>,
+    corridor: Vec<State>,
+    /// The queue of the ball while the one of the field serves the corridor.
+    rim: Queue,
     /// The second front of a search from both ends.
     pub(super) far: Field,
     /// Per thread, for start directions that are searched at once.
     pub(super) fans: Vec<Mutex<Fan>>,
-    meets: Vec<(State, State)>,
+    pub(super) vicinity: Vicinity,
     /// Per leg of a loop through anchors.
     pub(super) out: Vec<Field>,
     pub(super) home: Vec<Field>,
     pub(super) ahead: Vec<Field>,
-    pub(super) boundary: Option<Arc<BoundaryField>>,
+    pub(super) exits: ExitMemory,
 }
 
 impl SearchWorkspace {
     /// An empty workspace; it grows with the first search.
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// A workspace for another thread that shares what [`Self::prepare`] has made.
-    pub fn sharing(&self) -> Self {
-        Self { boundary: self.boundary.clone(), ..Self::default() }
     }
 }
 
@@ -222,103 +230,126 @@ pub(super) struct LoopSearch<'a> {
     pub(super) factor: f32,
 }
 
+/// Whether the ball has its radius.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ball {
+    Complete,
+    /// A loop is there and could be shown, but the ball is to grow on.
+    Growing,
+}
+
 impl LoopSearch<'_> {
-    fn limit(&self, best: &Option<Route>) -> f32 {
-        best.as_ref().map_or(f32::INFINITY, |r| r.cost * self.factor)
+    /// Begins step 1.
+    pub(super) fn start(&mut self) {
+        let out = self.graph.leaving(self.vertex);
+        let first = out.start;
+        let SearchWorkspace { root, ball, corridor, .. } = &mut *self.work;
+        root.restart(self.graph.n_states());
+        ball.clear();
+        corridor.clear();
+        for a in out.filter(|&a| self.mask.is_open(a)) {
+            root.set(a, 0.0, NO_STATE, (a - first) as u16);
+            root.push(0.0, a);
+        }
     }
 
-    /// Step 1; improves `best`.
-    pub(super) fn ball(&mut self, best: &mut Option<Route>) -> Result<(), Stop> {
+    /// Step 1: lets the ball grow as far as loops of up to `factor` times the cost of `best` need it, and improves
+    /// `best`. With `pause` it comes back early, so many states after there is a loop at all.
+    pub(super) fn ball(&mut self, best: &mut Option<Route>, factor: f32, pause: Option<u64>) -> Result<Ball, Stop> {
         let graph = self.graph;
-        let out = graph.leaving(self.vertex);
-        let first = out.start;
-        self.work.root.restart(graph.n_states());
-        self.work.meets.clear();
-        for a in out.filter(|&a| self.mask.is_open(a)) {
-            self.work.root.set(a, 0.0, NO_STATE, (a - first) as u16);
-            self.work.root.push(0.0, a);
-        }
-        let mut limit = self.limit(best);
-        while let Some((d, e)) = self.work.root.pop() {
-            if d >= 0.5 * limit {
+        let first = graph.leaving(self.vertex).start;
+        let mut cost = best.as_ref().map_or(f32::INFINITY, |r| r.cost);
+        let slack = self.slack();
+        let mut meet = None;
+        let mut patience = if best.is_some() { pause } else { None };
+        let SearchWorkspace { root, ball, .. } = &mut *self.work;
+        let mut outcome = Ok(Ball::Complete);
+        while root.top() < 0.5 * cost * factor {
+            if patience == Some(0) {
+                outcome = Ok(Ball::Growing);
                 break;
             }
-            if !self.work.root.settle(d, e) {
-                continue;
+            let Some((d, e)) = root.settle() else { break };
+            if let Err(stop) = self.meter.tick() {
+                outcome = Err(stop);
+                break;
             }
-            self.meter.tick()?;
-            let origin = self.work.root.labels[e as usize].origin;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
+            patience = patience.map(|p| p - 1);
+            ball.push(e);
+            let origin = root.parent(e).1;
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if !root.improves(f, reached) || !self.mask.is_open(f) {
+                    return;
+                }
+                root.set(f, reached, e, origin);
+                // What is too far stays labelled: the corridor may go on from there.
+                if reached < 0.5 * cost * slack {
+                    root.push(reached, f);
+                }
                 let back = graph.reverse[f as usize];
-                if let Some(&other) = self.work.root.get(back) {
-                    let total = reached + other.dist;
-                    if other.settled && total < limit {
-                        self.work.meets.push((e, f));
-                    }
-                    if total < best.as_ref().map_or(f32::INFINITY, |r| r.cost) {
-                        let (a, last) =
-                            (first + u32::from(origin), graph.reverse[(first + u32::from(other.origin)) as usize]);
-                        if graph.follows(last, a) {
-                            let cost = total + graph.step(last, a);
-                            if best.as_ref().is_none_or(|r| cost < r.cost) {
-                                *best = Some(Route { cost, states: self.joined(e, back), closed: true });
-                                limit = self.limit(best);
-                            }
-                        }
+                let total = reached + root.dist(back);
+                if total < cost {
+                    let (before, other) = root.parent(back);
+                    let (start, last) = (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
+                    if graph.follows(last, start) && total + graph.step(last, start) < cost {
+                        patience = patience.or(pause);
+                        (cost, meet) = (total + graph.step(last, start), Some((e, back, before)));
                     }
                 }
-                if reached < 0.5 * limit && reached < self.work.root.dist(f) {
-                    self.work.root.set(f, reached, e, origin);
-                    self.work.root.push(reached, f);
-                }
-            }
+            });
         }
-        Ok(())
+        if let Some((e, back, before)) = meet {
+            // The label of `back` may have changed since; those of settled states have not.
+            let mut states = root.chain(e);
+            states.push(graph.reverse[back as usize]);
+            if before != NO_STATE {
+                states.extend(root.chain(before).iter().rev().map(|&s| graph.reverse[s as usize]));
+            }
+            *best = Some(Route { cost, states, closed: true });
+        }
+        outcome
     }
 
-    /// The states from the source to `e`, and on along the reverse of the way to `back`.
-    fn joined(&self, e: State, back: State) -> Vec<State> {
-        let mut states = self.work.root.chain(e);
-        states.extend(self.work.root.chain(back).iter().rev().map(|&s| self.graph.reverse[s as usize]));
-        states
-    }
-
-    /// Step 2, for loops cheaper than `limit`.
+    /// Step 2, for loops cheaper than `limit`, half of which is the radius of the ball.
     pub(super) fn corridor(&mut self, limit: f32) -> Result<(), Stop> {
         let graph = self.graph;
-        let root = &mut self.work.root;
+        let SearchWorkspace { root, ball, corridor, rim, .. } = &mut *self.work;
+        std::mem::swap(&mut root.queue, rim);
         root.queue.clear();
-        for &(e, f) in &self.work.meets {
-            let step = graph.step(e, f);
-            let (back_e, back_f) = (graph.reverse[e as usize], graph.reverse[f as usize]);
-            for (x, from, across) in [(f, e, back_f), (back_e, back_f, e)] {
-                let reached = root.dist(from) + step;
-                let settled = root.get(x).is_some_and(|l| l.settled);
-                if !settled && reached <= root.dist(x) && reached + root.settled(across) < limit {
-                    let origin = root.labels[from as usize].origin;
-                    root.set(x, reached, from, origin);
-                    root.push(reached, x);
-                }
+        for &back in ball.iter() {
+            let x = graph.reverse[back as usize];
+            if !root.is_settled(x) && root.dist(x) + root.dist(back) < limit {
+                root.push(root.dist(x), x);
             }
         }
-        while let Some((d, e)) = root.pop() {
-            if !root.settle(d, e) {
-                continue;
-            }
+        while let Some((d, e)) = root.settle() {
             self.meter.tick()?;
-            let origin = root.labels[e as usize].origin;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let back = root.settled(graph.reverse[f as usize]);
-                let reached = d + graph.step(e, f);
-                // A settled state keeps its distance: another order of summing must not open it again.
-                if reached + back < limit && reached < root.dist(f) && !root.get(f).is_some_and(|l| l.settled) {
+            corridor.push(e);
+            let origin = root.parent(e).1;
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if root.improves(f, reached)
+                    && reached + root.settled(graph.reverse[f as usize]) < limit
+                    && self.mask.is_open(f)
+                {
                     root.set(f, reached, e, origin);
                     root.push(reached, f);
                 }
-            }
+            });
         }
+        std::mem::swap(&mut root.queue, rim);
         Ok(())
+    }
+
+    /// Back to step 1 after step 2. The distances in the corridor are exact, but the ball has not grown from there.
+    pub(super) fn resume(&mut self) {
+        let SearchWorkspace { root, corridor, .. } = &mut *self.work;
+        for e in corridor.drain(..) {
+            let (dist, (parent, origin)) = (root.dist(e), root.parent(e));
+            root.set(e, dist, parent, origin);
+            root.push(dist, e);
+        }
     }
 
     /// The start directions that can lie on a loop cheaper than `limit`, each with a lower bound, cheapest first.

@@ -186,18 +186,18 @@ impl Sectors<'_> {
                 field.push(closing, b);
             }
         }
-        while let Some((d, e)) = field.pop() {
-            if !field.settle(d, e) {
-                continue;
-            }
+        while let Some((d, e)) = field.settle() {
             meter.tick()?;
-            for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
-                if reached < field.dist(f) && reached + self.root.settled(graph.reverse[f as usize]) < limit {
+            graph.expand(e, |f, step| {
+                let reached = d + step;
+                if field.improves(f, reached)
+                    && reached + self.root.settled(graph.reverse[f as usize]) < limit
+                    && self.mask.is_open(f)
+                {
                     field.set(f, reached, e, 0);
                     field.push(reached, f);
                 }
-            }
+            });
         }
         Ok(())
     }
@@ -218,16 +218,15 @@ impl Sectors<'_> {
         let (mut cost, mut last) = (limit, NO_STATE);
         let (mut from, mut d, mut parent) = (a, 0.0, NO_STATE);
         loop {
-            for f in graph.successors(from).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(from, f);
-                if reached >= star.dist(f) {
-                    continue;
+            graph.expand(from, |f, step| {
+                let reached = d + step;
+                if !star.improves(f, reached) {
+                    return;
                 }
                 let key = reached + potential.settled(graph.reverse[f as usize]);
-                if key >= cost {
-                    continue;
+                if key >= cost || !self.mask.is_open(f) {
+                    return;
                 }
-                // The potential is exact up to rounding only, so a state may be reached again, a bit cheaper.
                 star.set(f, reached, parent, 0);
                 star.push(key, f);
                 if graph.follows(f, a) {
@@ -236,8 +235,8 @@ impl Sectors<'_> {
                         (cost, last) = (closed, f);
                     }
                 }
-            }
-            let Some((_, e)) = star.pop_fresh().filter(|&(key, _)| key < cost) else { break };
+            });
+            let Some((_, e)) = star.settle().filter(|&(key, _)| key < cost) else { break };
             meter.tick()?;
             (from, d, parent) = (e, star.dist(e), e);
         }

@@ -4,6 +4,7 @@
 //! of directions in which it is seen; a vertex inside its window is the end of a straight geodesic. Vertices
 //! hidden behind a saddle have none and are left out.
 
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::{DVec2, DVec3};
@@ -90,18 +91,26 @@ pub(crate) struct Geodesic {
     pub(crate) length: f64,
     /// The corner it starts in, as outgoing half-edge of the source.
     pub(crate) start: HalfedgeId,
-    /// Angle from `start`.
-    pub(crate) start_angle: f64,
     /// The corner it ends in, as outgoing half-edge of the target.
     pub(crate) end: HalfedgeId,
-    /// Angle from `end` to the direction back to the source.
-    pub(crate) end_angle: f64,
     /// The end in the plane of the start corner.
     position: DVec2,
+    /// The direction of `end` in that plane.
+    side: DVec2,
     window: u32,
 }
 
 impl Geodesic {
+    /// Angle from `start`.
+    pub(crate) fn start_angle(&self) -> f64 {
+        self.position.y.atan2(self.position.x).max(0.0)
+    }
+
+    /// Angle from `end` to the direction back to the source.
+    pub(crate) fn end_angle(&self) -> f64 {
+        self.side.perp_dot(-self.position).atan2(self.side.dot(-self.position)).max(0.0)
+    }
+
     /// Whether it is a mesh edge.
     pub(crate) fn is_edge(&self) -> bool {
         self.window == ROOT
@@ -230,17 +239,13 @@ impl Unfolding {
             let (from_low, to_high) = (sine(w.low, c), sine(c, w.high));
             if from_low >= -GRAZING && to_high >= -GRAZING {
                 let end = mesh.prev(twin);
-                let side = w.b - c;
-                let end_angle = side.perp_dot(-c).atan2(side.dot(-c)).max(0.0);
-                let start_angle = c.y.atan2(c.x).max(0.0);
                 let geodesic = Geodesic {
                     target: apex,
                     length: c.length(),
                     start: w.start,
-                    start_angle,
                     end,
-                    end_angle,
                     position: c,
+                    side: w.b - c,
                     window: index,
                 };
                 if visit(geodesic).is_break() {
@@ -298,20 +303,19 @@ fn unfold_apex(mesh: &TriMesh, w: &Window, apex: VertexId) -> Option<DVec2> {
 }
 
 fn along_spoke(mesh: &TriMesh, h: HalfedgeId) -> Geodesic {
-    let (end, end_angle) = match mesh.twin(h) {
-        Some(t) => (t, 0.0),
-        None => (mesh.next(h), mesh.corner_angle(mesh.next(h))),
-    };
     let length = mesh.vector(h).length();
     let position = DVec2::new(length, 0.0);
-    Geodesic { target: mesh.target(h), length, start: h, start_angle: 0.0, end, end_angle, position, window: ROOT }
+    let (end, side) = match mesh.twin(h) {
+        Some(t) => (t, -position),
+        None => (mesh.next(h), DVec2::from_angle(PI - mesh.corner_angle(mesh.next(h)))),
+    };
+    Geodesic { target: mesh.target(h), length, start: h, end, position, side, window: ROOT }
 }
 
 /// The geodesic along the boundary edge that ends the fan, in the corner of spoke `h`.
 fn along_last_spoke(mesh: &TriMesh, h: HalfedgeId) -> Geodesic {
     let end = mesh.prev(h);
     let length = mesh.vector(end).length();
-    let start_angle = mesh.corner_angle(h);
-    let position = DVec2::from_angle(start_angle) * length;
-    Geodesic { target: mesh.origin(end), length, start: h, start_angle, end, end_angle: 0.0, position, window: ROOT }
+    let position = DVec2::from_angle(mesh.corner_angle(h)) * length;
+    Geodesic { target: mesh.origin(end), length, start: h, end, position, side: -position, window: ROOT }
 }

@@ -87,8 +87,8 @@ impl<'a> Weights<'a> {
 
     /// Alignment cost of a geodesic: the mean of its ends, and what the creases it crosses on its way add.
     pub(super) fn of_geodesic(&self, v: VertexId, g: &Geodesic, crossings: &[EdgeCrossing]) -> f64 {
-        let departure = direction_in_face(self.mesh, g.start, g.start_angle);
-        let arrival = direction_in_face(self.mesh, g.end, g.end_angle);
+        let departure = direction_in_face(self.mesh, g.start, g.start_angle());
+        let arrival = direction_in_face(self.mesh, g.end, g.end_angle());
         let ends = 0.5 * (self.at_vertex(v, departure) + self.at_vertex(g.target, arrival));
         let crossed = crossings
             .iter()

@@ -9,6 +9,7 @@ mod embedding;
 mod export;
 mod layout;
 mod model;
+mod recent;
 mod report;
 mod script;
 mod session;

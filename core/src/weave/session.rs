@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use thiserror::Error;
 
 use super::design::{Design, DesignError, Pin, Strip, StripId};
 use super::model::{Model, Options};
+use super::recent::RecentSearches;
 use super::suggest::Stuck;
 use super::woven::Woven;
 use crate::dual::{Arrangement, ArrangementError};
-use crate::elastica::{ElasticaError, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
+use crate::elastica::{Certainty, ElasticaError, ElasticaGraph, FoundLoop};
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
 use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
@@ -112,7 +114,7 @@ pub struct Session {
     undo: Vec<Step>,
     redo: Vec<Step>,
     next_id: u32,
-    workspace: SearchWorkspace,
+    recent: RecentSearches,
 }
 
 impl Session {
@@ -141,8 +143,8 @@ impl Session {
         let model = Arc::new(Model::prepare(loaded, design.options, progress)?);
         let woven = Arc::new(Woven::new(&model, &design.strips, progress)?);
         let next_id = design.strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
-        let (undo, redo, workspace) = (Vec::new(), Vec::new(), SearchWorkspace::new());
-        Ok(Self { model, design, woven, undo, redo, next_id, workspace })
+        let (undo, redo, recent) = (Vec::new(), Vec::new(), RecentSearches::default());
+        Ok(Self { model, design, woven, undo, redo, next_id, recent })
     }
 
     /// The mesh made ready.
@@ -174,7 +176,8 @@ impl Session {
         self.proposals_with(at, progress, |_| {})
     }
 
-    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best.
+    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best, and the best
+    /// when it is, before alternatives are there.
     ///
     /// # Errors
     ///
@@ -187,22 +190,24 @@ impl Session {
     ) -> Result<Vec<Proposal>, WeaveError> {
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
-        let query = ProposalQuery::alternatives(vertex, &self.woven.mask);
-        let mut found = graph.proposals_with(&query, &mut self.workspace, progress, |l| {
-            first(Proposal { curve: l.curve.clone(), cost: l.cost });
-        })?;
-        if found.loops.is_empty() {
-            // Strips cover every way through here; only their spines are then kept clear of.
-            let query = ProposalQuery { mask: &self.woven.spine_mask, ..query };
-            found = graph.proposals(&query, &mut SearchWorkspace::new(), progress)?;
-        }
-        found.loops.into_iter().map(|l| polished(graph, &l, at, progress)).collect()
-    }
-
-    /// A workspace that shares what searches with the present mask have to prepare on open surfaces.
-    pub(super) fn prepared_workspace(&mut self, progress: &Progress) -> Result<SearchWorkspace, Cancelled> {
-        self.workspace.prepare(&self.model.graph, &self.woven.mask, progress)?;
-        Ok(self.workspace.sharing())
+        let polished = |l: &FoundLoop| polished(graph, l, at, progress);
+        let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
+        let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
+            Certainty::Found => first(Proposal { curve: l.curve.clone(), cost: l.cost }),
+            Certainty::Proved => {
+                let smooth = polished(l);
+                if let Ok(smooth) = &smooth {
+                    first(smooth.clone());
+                }
+                best = Some((l.curve.clone(), smooth));
+            }
+        };
+        let found = self.recent.proposals(graph, &self.woven, vertex, progress, &mut watch)?;
+        // What was handed out already is not smoothed again.
+        let (known, smooth) = best.map_or((None, None), |(curve, smooth)| (Some(curve), Some(smooth)));
+        let done = found.first().is_some_and(|l| known.as_ref() == Some(&l.curve));
+        let rest: Vec<_> = found.par_iter().skip(usize::from(done)).map(polished).collect();
+        smooth.filter(|_| done).into_iter().chain(rest).collect()
     }
 
     /// Places a strip.

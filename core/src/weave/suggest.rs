@@ -69,7 +69,6 @@ impl Session {
     ///
     /// [`Stuck`], or cancelled.
     pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
-        let mut shared = self.prepared_workspace(progress)?;
         let woven = self.woven();
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
@@ -80,9 +79,8 @@ impl Session {
         let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
         for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
             progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
-            shared.prepare(&self.model().graph, mask, progress)?;
             for &region in urgent.iter().take(regions) {
-                let candidates = self.candidates(region, search, mask, &shared, progress)?;
+                let candidates = self.candidates(region, search, mask, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
                     return Ok(self.smoothed(best, RelaxOptions::default().tube, before, goal, progress)?);
                 }
@@ -147,7 +145,6 @@ impl Session {
         region: u32,
         search: Search,
         mask: &DirectionMask,
-        shared: &SearchWorkspace,
         progress: &Progress,
     ) -> Result<Vec<Proposal>, WeaveError> {
         let graph = &self.model().graph;
@@ -158,12 +155,12 @@ impl Session {
                 Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
             })
             .collect();
-        // One workspace per thread; they share what is prepared already.
+        graph.prepare(progress)?;
         let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
         let found: Vec<Vec<Proposal>> = queries
             .par_chunks(share)
             .map(|queries| {
-                let mut work = shared.sharing();
+                let mut work = SearchWorkspace::new();
                 let mut list = Vec::new();
                 for &(vertex, direction) in queries {
                     let query =

@@ -1,0 +1,124 @@
+//! The searches of the last places the pointer was at.
+//!
+//! A pointer that moves stays near a vertex for some steps and comes back to it; what was found there holds as long
+//! as the strips are the same. A search that is cut short leaves what it had proved.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::woven::Woven;
+use crate::elastica::{Certainty, DirectionMask, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
+use crate::mesh::VertexId;
+use crate::progress::{Cancelled, Progress};
+
+/// Number of vertices remembered: those under a small movement of the pointer.
+const REMEMBERED: usize = 16;
+
+/// What was found of late, and the memory of the searches.
+#[derive(Debug, Default)]
+pub(super) struct RecentSearches {
+    pub(super) workspace: SearchWorkspace,
+    /// For searches along strips; their own, because what they have to prepare differs.
+    beside: SearchWorkspace,
+    /// The strips among which all this was found.
+    woven: Option<Arc<Woven>>,
+    /// The latest last.
+    found: VecDeque<Found>,
+}
+
+/// What was found at a vertex.
+#[derive(Debug)]
+struct Found {
+    vertex: VertexId,
+    best: Option<FoundLoop>,
+    /// All that is proposed, if that search has ended.
+    all: Option<Arc<Vec<FoundLoop>>>,
+}
+
+impl RecentSearches {
+    /// The loops proposed at a vertex; what is there before all are found goes to `watch`.
+    pub(super) fn proposals(
+        &mut self,
+        graph: &ElasticaGraph,
+        woven: &Arc<Woven>,
+        vertex: VertexId,
+        progress: &Progress,
+        watch: &mut dyn FnMut(Certainty, &FoundLoop),
+    ) -> Result<Arc<Vec<FoundLoop>>, Cancelled> {
+        if !self.woven.as_ref().is_some_and(|w| Arc::ptr_eq(w, woven)) {
+            self.woven = Some(Arc::clone(woven));
+            self.found.clear();
+        }
+        let known = self.found.iter().position(|f| f.vertex == vertex).and_then(|i| self.found.remove(i));
+        let mut found = known.unwrap_or(Found { vertex, best: None, all: None });
+        let result = match &found.all {
+            Some(all) => {
+                if let Some(best) = &found.best {
+                    watch(Certainty::Proved, best);
+                }
+                Ok(Arc::clone(all))
+            }
+            None => {
+                let searched = self.search(graph, woven, vertex, progress, &mut found.best, watch).map(Arc::new);
+                found.all = searched.as_ref().ok().map(Arc::clone);
+                searched
+            }
+        };
+        if self.found.len() == REMEMBERED {
+            self.found.pop_front();
+        }
+        self.found.push_back(found);
+        result
+    }
+
+    fn search(
+        &mut self,
+        graph: &ElasticaGraph,
+        woven: &Woven,
+        vertex: VertexId,
+        progress: &Progress,
+        best: &mut Option<FoundLoop>,
+        watch: &mut dyn FnMut(Certainty, &FoundLoop),
+    ) -> Result<Vec<FoundLoop>, Cancelled> {
+        if let Some(best) = best {
+            watch(Certainty::Found, best);
+        }
+        let mut searched = |mask: &DirectionMask, work: &mut SearchWorkspace| {
+            let query = ProposalQuery::alternatives(vertex, mask);
+            let found = graph.proposals_with(&query, work, progress, |certainty, l| {
+                if certainty == Certainty::Proved {
+                    *best = Some(l.clone());
+                }
+                watch(certainty, l);
+            })?;
+            Ok(found.loops)
+        };
+        let loops = searched(&woven.mask, &mut self.workspace)?;
+        // Where strips cover every way through, only their spines are kept clear of.
+        if loops.is_empty() { searched(&woven.spine_mask, &mut self.beside) } else { Ok(loops) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+    use crate::surface::SurfacePoint;
+    use crate::weave::{MeshSource, Options, Session};
+
+    #[test]
+    fn what_was_found_is_remembered_until_the_strips_change() {
+        let progress = Progress::new();
+        let source = MeshSource::Builtin("torus".into());
+        let mut session = Session::open(builtin("torus").unwrap(), source, Options::default(), &progress).unwrap();
+        let at = SurfacePoint { face: crate::mesh::FaceId(100), weights: [0.8, 0.1, 0.1] };
+        let mut handed = Vec::new();
+        let first = session.proposals_with(at, &progress, |p| handed.push(p)).unwrap();
+        assert!(handed.len() >= 2 && handed.last() == first.first());
+        handed.clear();
+        assert_eq!(session.proposals_with(at, &progress, |p| handed.push(p)).unwrap(), first);
+        assert_eq!(handed, first[..1]);
+        session.place(first[0].clone(), &progress).unwrap();
+        assert_ne!(session.proposals(at, &progress).unwrap(), first);
+    }
+}

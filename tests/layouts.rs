@@ -39,7 +39,7 @@ fn end(net: &Net, arc: u32, second: bool) -> (HalfedgeId, i32) {
 #[test]
 fn the_field_turns_as_the_layout_says_on_every_surface() {
     for name in ["cino_3holes", "pretzel", "fertility_13k", "vase_open", "sleeve", "aqua_center"] {
-        let Some((session, Drawn { layout, embedding })) = woven(name) else { return };
+        let Some((session, Drawn { layout, embedding, .. })) = woven(name) else { return };
         let surface = &session.model().mesh;
         let net = Net::new(surface, &embedding, &layout, &headings(&layout)).unwrap();
         // Around nodes as their valences say, around every other vertex not at all.
@@ -113,7 +113,7 @@ fn job_of<'a>(session: &'a Session, drawn: &'a Drawn, headings: &'a [Headings]) 
 }
 
 /// The same drawing with arcs and nodes numbered backward, and patches that begin with their second side.
-fn renumbered(Drawn { layout, embedding }: &Drawn) -> Drawn {
+fn renumbered(Drawn { layout, embedding, ground }: &Drawn) -> Drawn {
     let (a, n) = (layout.arcs.len() as u32 - 1, layout.nodes.len() as u32 - 1);
     let patch = |p: &Patch| Patch {
         corners: [1, 2, 3, 0].map(|i| n - p.corners[i]),
@@ -133,7 +133,7 @@ fn renumbered(Drawn { layout, embedding }: &Drawn) -> Drawn {
     drawing.nodes.reverse();
     drawing.arcs.reverse();
     drawing.arc_parameters.reverse();
-    Drawn { layout: turned, embedding: drawing }
+    Drawn { layout: turned, embedding: drawing, ground: *ground }
 }
 
 #[test]

@@ -91,7 +91,7 @@ pub struct StripId(pub u32);
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// Its spine on the design mesh.
+    /// Its spine on the mesh that the engine weaves on.
     pub curve: SurfaceCurve,
     /// The lower, the better.
     pub cost: f64,
@@ -214,17 +214,18 @@ pub struct ModelFacts {
     pub repairs: Vec<String>,
 }
 
-/// The triangles to draw, perhaps finer than the design mesh. Arrays per face have one entry for each of `faces`.
+/// The triangles to draw, perhaps finer than the design mesh. Arrays per face have one entry for each of `faces`; what
+/// does not change with the strips is shared by the snapshots of a large mesh.
 #[derive(Debug, Clone, Default)]
 pub struct DisplaySurface {
     /// Positions.
-    pub positions: Vec<DVec3>,
+    pub positions: Arc<Vec<DVec3>>,
     /// Triangles, counterclockwise from outside.
-    pub faces: Vec<[u32; 3]>,
+    pub faces: Arc<Vec<[u32; 3]>>,
     /// Normals at the corners of each face.
-    pub normals: Vec<[DVec3; 3]>,
+    pub normals: Arc<Vec<[DVec3; 3]>>,
     /// The triangle of the design mesh that each face lies in.
-    pub base: Vec<u32>,
+    pub base: Arc<Vec<u32>>,
     /// The colour of the region of each face; empty when there are no regions yet.
     pub regions: Vec<RegionColor>,
     /// The stripe pattern of each face along both families; empty when there is no strip map.

@@ -36,10 +36,10 @@ impl Opener for StandIn {
         let mesh = builtin("rounded-cube").unwrap().mesh;
         let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
         let surface = DisplaySurface {
-            positions: mesh.positions().to_vec(),
-            normals: faces.iter().map(|f| f.map(|v| mesh.positions()[v as usize])).collect(),
-            base: (0..faces.len() as u32).collect(),
-            faces,
+            positions: Arc::new(mesh.positions().to_vec()),
+            normals: Arc::new(faces.iter().map(|f| f.map(|v| mesh.positions()[v as usize])).collect()),
+            base: Arc::new((0..faces.len() as u32).collect()),
+            faces: Arc::new(faces),
             ..DisplaySurface::default()
         };
         let index = SurfaceIndex::new(&mesh);
@@ -51,7 +51,7 @@ impl Opener for StandIn {
             nodes: vec![node(on_surface(-0.1, 0.0)), node(on_surface(0.1, 0.0))],
             arcs: vec![LayoutArc { points: along, ..LayoutArc::default() }],
         };
-        let (index, mesh, surface) = (Arc::new(index), Arc::new(mesh), Arc::new(surface));
+        let (index, surface) = (Arc::new(index), Arc::new(surface));
         Ok(Box::new(Session { mesh, index, surface, strips: 0, layout, embedding: None }))
     }
 }

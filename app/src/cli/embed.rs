@@ -11,7 +11,7 @@ use plait_core::progress::Progress;
 use plait_core::weave::{Export, OpenedLayout, Session, Times, draw, write_all};
 
 use super::weave::{explain, export_options, open, say};
-use super::{EmbedArguments, has_extension};
+use super::{DetailArguments, EmbedArguments, has_extension};
 
 /// Embeds and writes into the folder.
 ///
@@ -42,10 +42,10 @@ pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
         let written = layout.write_all(&options, &arguments.out, seconds(), progress, &mut watch)?;
         (layout.mesh().mesh.n_faces(), written.context("no layout was written")?)
     } else {
-        let mut session = open(&arguments.input, false, progress)?;
+        let mut session = open(&arguments.input, false, &DetailArguments::default(), progress)?;
         pin(&mut session, arguments, progress)?;
         let written = write_all(&session, None, &options, &arguments.out, seconds(), progress, &mut watch)?;
-        (session.model().mesh.n_faces(), written.map_err(|error| explain(&session, error))?)
+        (session.model().loaded.mesh.n_faces(), written.map_err(|error| explain(&session, error))?)
     };
     let name = arguments.input.file_name().map(Path::new).unwrap_or(&arguments.input);
     say(&format!("{}: {faces} faces, {}, {:.1} s", name.display(), summary(&export), start.elapsed().as_secs_f64()));

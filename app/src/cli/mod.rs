@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand, ValueEnum};
+use plait_core::weave::Options;
 
 use crate::engine::{Opener, Source};
 
@@ -75,6 +76,9 @@ pub struct WeaveArguments {
     /// Write the layout as it is first drawn, without optimising its embedding.
     #[arg(long, conflicts_with_all = ["integer", "simplify", "collapse"])]
     pub no_optimise: bool,
+    /// How much of the shape strips follow.
+    #[command(flatten)]
+    pub detail: DetailArguments,
 }
 
 /// How fine quads.obj is to be.
@@ -101,6 +105,37 @@ pub struct RefineArguments {
     /// length, shorter than a quad's edge.
     #[arg(long, value_name = "LENGTH", num_args = 0..=1)]
     pub collapse: Option<Option<f64>>,
+}
+
+/// How much of the shape strips follow. What is not given is as usual, or as the design or the script says.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct DetailArguments {
+    /// Weave meshes of more than twice as many triangles on a proxy of this many; 0: never.
+    #[arg(long, value_name = "TRIANGLES")]
+    pub proxy: Option<u32>,
+    /// Radius over which curvature is measured, as a fraction of the bounding-box diagonal.
+    #[arg(long, value_name = "RADIUS", value_parser = parse_radius)]
+    pub curvature_radius: Option<f64>,
+    /// Pass over relief smaller than this fraction of the bounding-box diagonal.
+    #[arg(long, value_name = "RADIUS", value_parser = parse_radius)]
+    pub smoothing: Option<f64>,
+}
+
+impl DetailArguments {
+    /// The options with what is given here.
+    pub fn over(&self, options: Options) -> Options {
+        Options {
+            proxy: self.proxy.unwrap_or(options.proxy),
+            curvature_radius: self.curvature_radius.unwrap_or(options.curvature_radius),
+            smoothing: self.smoothing.unwrap_or(options.smoothing),
+            ..options
+        }
+    }
+}
+
+fn parse_radius(text: &str) -> Result<f64, String> {
+    let radius = text.parse::<f64>().ok().filter(|r| (0.0..=0.5).contains(r));
+    radius.ok_or_else(|| "a radius is a number from 0 to 0.5".to_owned())
 }
 
 /// Arguments of `plait embed`.
@@ -259,6 +294,10 @@ mod tests {
         let weave = parse("plait weave cube --suggest --until orange --out x --quads 500").unwrap();
         let Some(Command::Weave(weave)) = weave.command else { panic!("not weave") };
         assert_eq!((weave.until, weave.size.quads), (Until::Orange, Some(500)));
+        let detail = parse("plait weave cube --suggest --out x --proxy 9000 --smoothing 0.02").unwrap();
+        let Some(Command::Weave(WeaveArguments { detail, .. })) = detail.command else { panic!("not weave") };
+        let usual = Options::default();
+        assert_eq!(detail.over(usual), Options { proxy: 9000, smoothing: 0.02, ..usual });
         let embed = parse("plait embed a.layout --out x --pin-nodes 1,2 --edge-length 0.1 --steps 3").unwrap();
         let Some(Command::Embed(embed)) = embed.command else { panic!("not embed") };
         assert_eq!((embed.pin_nodes, embed.size.edge_length, embed.steps), (vec![1, 2], Some(0.1), Some(3)));
@@ -269,6 +308,7 @@ mod tests {
         assert!(parse("plait weave a --out x --edge-length 1 --quads 5").is_err());
         assert!(parse("plait weave a --out x --until orange").is_err());
         assert!(parse("plait embed a --out x --pin-nodes 1,b").is_err());
+        assert!(parse("plait weave a --out x --curvature-radius 3").is_err());
         assert!(parse("plait render a --out x.png --size 10x10").is_err());
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
     }

@@ -9,12 +9,12 @@ use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay,
+    Design, ExportOptions, Goal, Ground, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay,
     write_all,
 };
 
 use super::embed::summary;
-use super::{RefineArguments, SizeArguments, Until, WeaveArguments, has_extension};
+use super::{DetailArguments, RefineArguments, SizeArguments, Until, WeaveArguments, has_extension};
 
 /// Weaves and writes into the folder.
 ///
@@ -24,7 +24,7 @@ use super::{RefineArguments, SizeArguments, Until, WeaveArguments, has_extension
 pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     let progress = Progress::new();
     let start = Instant::now();
-    let mut session = open(&arguments.input, arguments.suggest, &progress)?;
+    let mut session = open(&arguments.input, arguments.suggest, &arguments.detail, &progress)?;
     let opened = start.elapsed().as_secs_f64();
     if arguments.suggest {
         let goal = match arguments.until {
@@ -49,6 +49,9 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
         summary(&export),
         start.elapsed().as_secs_f64(),
     ));
+    if export.ground == Ground::Proxy {
+        say("plait: the layout is embedded on the proxy, and its quads are carried to the mesh");
+    }
     if let Some(Err(problem)) = export.optimised {
         say(&format!("plait: the rough drawing was written, since the optimisation failed: {problem}"));
     }
@@ -87,13 +90,30 @@ fn quad_size(arguments: SizeArguments) -> anyhow::Result<QuadSize> {
 }
 
 /// A session on a script replayed, a saved design, or (to place suggestions on) a bare mesh.
-pub(super) fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::Result<Session> {
+pub(super) fn open(
+    input: &Path,
+    suggest: bool,
+    detail: &DetailArguments,
+    progress: &Progress,
+) -> anyhow::Result<Session> {
+    let session = opened(input, suggest, detail, progress)?;
+    if let Some(proxy) = &session.model().proxy {
+        let (all, n) = (session.model().loaded.mesh.n_faces(), proxy.mesh().n_faces());
+        say(&format!("plait: {all} triangles, woven on a proxy of {n}"));
+    }
+    Ok(session)
+}
+
+fn opened(input: &Path, suggest: bool, detail: &DetailArguments, progress: &Progress) -> anyhow::Result<Session> {
     let folder = input.parent().unwrap_or(Path::new(""));
     if has_extension(input, "json") {
-        return Ok(replay(&Script::read(input)?, folder, progress)?);
+        let mut script = Script::read(input)?;
+        script.options = detail.over(script.options);
+        return Ok(replay(&script, folder, progress)?);
     }
     if has_extension(input, "plait") {
-        let design = Design::read(input)?;
+        let mut design = Design::read(input)?;
+        design.options = detail.over(design.options);
         let loaded = design.mesh.load(folder)?;
         return Ok(Session::resume(loaded, design, progress)?);
     }
@@ -106,7 +126,7 @@ pub(super) fn open(input: &Path, suggest: bool, progress: &Progress) -> anyhow::
         MeshSource::File(path) => MeshSource::File(path.canonicalize().unwrap_or(path)),
         builtin @ MeshSource::Builtin(_) => builtin,
     };
-    Ok(Session::open(loaded, source, Options::default(), progress)?)
+    Ok(Session::open(loaded, source, detail.over(Options::default()), progress)?)
 }
 
 /// Why there is no layout, region by region where that is the reason.

@@ -11,8 +11,9 @@ use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfaceIndex;
-use plait_core::weave::{self, Drawn, PinnedParts, Session, WeaveError};
+use plait_core::weave::{self, Drawn, Ground, PinnedParts, Session, WeaveError};
 
+use super::cover;
 use crate::engine::{
     EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColor, Remark,
     TriangleDistortion,
@@ -48,7 +49,7 @@ impl Shown {
         let drawn = weave::draw(session, progress)?;
         let (nodes, arcs) = drawing(&drawn.embedding);
         let model = session.model();
-        let on_surface = |p| model.index.nearest(p).position(&model.mesh);
+        let on_surface = |p| model.index.nearest(p).position(&model.loaded.mesh);
         // Along the boundary arcs already are as they will be.
         let boundary = |i: usize| drawn.layout.arcs[i].boundary;
         let arcs = arcs.into_iter().enumerate();
@@ -130,14 +131,18 @@ pub fn optimise(
         let model = session.model();
         let ends = drawn.layout.arcs.iter().map(|a| a.nodes).collect();
         let layout = layout.clone();
-        let mut steps = Steps { index: &model.index, mesh: &model.mesh, ends, layout, energy: None };
+        let mut steps = Steps { index: &model.index, mesh: &model.loaded.mesh, ends, layout, energy: None };
         let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
             ControlFlow::Continue(()) => Next::Continue,
             ControlFlow::Break(()) => Next::Finish,
         };
         weave::optimise(session, drawn, &pinned, progress, &mut relay).map_err(|error| failed(&error, progress))
     };
-    let again = last.map(|l| Drawn { layout: shown.drawn.layout.clone(), embedding: l.embedded.embedding.clone() });
+    let again = last.map(|l| Drawn {
+        layout: shown.drawn.layout.clone(),
+        embedding: l.embedded.embedding.clone(),
+        ground: shown.drawn.ground,
+    });
     let embedded = match again.as_ref().map(&mut from) {
         // Pinned parts are to stay where they are now, not where the first drawing had them.
         Some(Ok(embedded)) => embedded,
@@ -148,7 +153,7 @@ pub fn optimise(
         }
         None => from(&shown.drawn)?,
     };
-    Ok(finished(session, &shown.drawn.layout, embedded))
+    Ok(finished(session, &shown.drawn, embedded))
 }
 
 fn failed(error: &EmbeddingError, progress: &Progress) -> EngineError {
@@ -204,11 +209,16 @@ fn drag(points: &mut [DVec3], ends: [DVec3; 2], on_surface: impl Fn(DVec3) -> DV
     }
 }
 
-fn finished(session: &Session, layout: &QuadLayout, embedded: Embedded) -> Optimised {
+fn finished(session: &Session, drawn: &Drawn, embedded: Embedded) -> Optimised {
     let model = session.model();
-    let bending = face_curvature(&model.mesh, &model.curvature, |_| true);
+    let surface = model.surface(drawn.ground);
+    let bending = face_curvature(surface.mesh, surface.curvature, |_| true);
     let (_, patches, triangles) = measure_patches(&embedded.maps, &bending);
     let report = &embedded.report;
+    let mut distortion = on_surface(surface.mesh.n_faces(), &embedded.maps, &triangles);
+    if drawn.ground == Ground::Proxy {
+        distortion = cover::faces(model).iter().map(|p| distortion[p.face.index()]).collect();
+    }
     let summary = EmbeddingSummary {
         steps: report.steps,
         energy: [report.energy_before, report.energy_after],
@@ -218,10 +228,10 @@ fn finished(session: &Session, layout: &QuadLayout, embedded: Embedded) -> Optim
         planar: report.measures.planar,
         aspect: most_oblong(&embedded.maps, &patches),
         folds: folds(report.folds.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)))),
-        triangles: on_surface(model.mesh.n_faces(), &embedded.maps, &triangles),
+        triangles: distortion,
     };
     let (nodes, arcs) = drawing(&embedded.embedding);
-    Optimised { preview: preview(layout, &nodes, arcs.into_iter()), summary: Arc::new(summary), embedded }
+    Optimised { preview: preview(&drawn.layout, &nodes, arcs.into_iter()), summary: Arc::new(summary), embedded }
 }
 
 fn drawing(embedding: &Embedding) -> (Vec<DVec3>, Vec<Vec<DVec3>>) {

@@ -1,5 +1,6 @@
 //! The engine of the window: a session of the library behind [`Engine`], with its snapshots.
 
+mod cover;
 mod embedding;
 mod snapshot;
 mod stripes;
@@ -15,7 +16,7 @@ use plait_core::layout::LayoutError;
 use plait_core::mesh::builtin_names;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
-use plait_core::weave::{self, Design, Goal, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
+use plait_core::weave::{self, Design, Goal, Ground, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
 use crate::engine::{
     BuiltIn, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview, Opener,
@@ -163,7 +164,7 @@ impl SessionEngine {
     }
 
     fn proposal(&self, proposal: weave::Proposal) -> Proposal {
-        let polyline = proposal.points(&self.session.model().mesh);
+        let polyline = self.session.model().shown(&proposal.curve);
         Proposal { curve: proposal.curve, cost: proposal.cost, polyline }
     }
 }
@@ -175,8 +176,8 @@ impl Engine for SessionEngine {
         first: &mut dyn FnMut(Proposal),
         progress: &Progress,
     ) -> Result<Vec<Proposal>, EngineError> {
-        let mesh = Arc::clone(&self.session.model().mesh);
-        let shown = |p: weave::Proposal| Proposal { polyline: p.points(&mesh), curve: p.curve, cost: p.cost };
+        let model = Arc::clone(self.session.model());
+        let shown = |p: weave::Proposal| Proposal { polyline: model.shown(&p.curve), curve: p.curve, cost: p.cost };
         let found = self.session.proposals_with(at, progress, |p| first(shown(p)));
         Ok(found.map_err(plain)?.into_iter().map(|p| self.proposal(p)).collect())
     }
@@ -285,8 +286,11 @@ impl Engine for SessionEngine {
             export.layout.n_irregular(),
             export.quads.quads.len()
         );
-        let files = ["design.plait", "layout.layout", "layout.obj", "quads.obj", "patches.obj", "report.json"];
-        Ok(ExportReport { files: files.map(|f| folder.join(f)).to_vec(), summary })
+        let mut files = vec!["design.plait", "layout.obj", "quads.obj", "patches.obj", "report.json"];
+        if export.ground == Ground::Design {
+            files.insert(1, "layout.layout");
+        }
+        Ok(ExportReport { files: files.into_iter().map(|f| folder.join(f)).collect(), summary })
     }
 }
 

@@ -7,6 +7,7 @@ use plait_core::dual::RefinedMesh;
 use plait_core::mesh::{FaceId, TriMesh};
 use plait_core::weave::Session;
 
+use super::cover::Cover;
 use super::{Later, stripes, words};
 use crate::engine::{DisplaySurface, ModelFacts, Scene, Strip, StripId};
 use crate::shading::corner_normals;
@@ -14,16 +15,28 @@ use crate::shading::corner_normals;
 /// What stays the same while strips come and go.
 pub struct ModelSnapshot {
     facts: Arc<ModelFacts>,
-    /// Normals at the corners of the faces of the design mesh.
-    normals: Vec<[DVec3; 3]>,
+    look: Look,
+}
+
+/// How the mesh looks without strips.
+enum Look {
+    /// Normals at the corners of the faces of a mesh that is woven on itself.
+    Itself(Vec<[DVec3; 3]>),
+    /// A mesh that is woven on its proxy.
+    Covered(Cover),
 }
 
 impl ModelSnapshot {
     pub fn new(session: &Session) -> Self {
         let model = session.model();
-        let faces: Vec<[u32; 3]> = model.mesh.faces().map(|f| model.mesh.face_vertices(f).map(|v| v.0)).collect();
-        let normals = corner_normals(model.mesh.positions(), &faces, model.options.sharp_dihedral);
-        Self { facts: Arc::new(facts(session)), normals }
+        let mesh = &model.loaded.mesh;
+        let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
+        let normals = corner_normals(mesh.positions(), &faces, model.options.sharp_dihedral);
+        let look = match model.proxy {
+            Some(_) => Look::Covered(Cover::new(model, faces, normals)),
+            None => Look::Itself(normals),
+        };
+        Self { facts: Arc::new(facts(session)), look }
     }
 
     /// The present state of `session`.
@@ -32,14 +45,14 @@ impl ModelSnapshot {
         let (summary, exportable) = words::summary(session);
         let strips = design.strips.iter().map(|s| Strip {
             id: StripId(s.id.0),
-            polyline: s.curve.points(&model.mesh),
+            polyline: s.curve.points(&model.loaded.mesh),
             closed: s.curve.closed,
-            length: s.curve.length(&model.mesh) * model.loaded.units.scale,
+            length: s.curve.length(&model.loaded.mesh) * model.loaded.units.scale,
             visible: s.visible,
         });
         Scene {
             model: Arc::clone(&self.facts),
-            design_mesh: Arc::clone(&model.mesh),
+            design_mesh: Arc::clone(&model.loaded.mesh),
             index: Arc::clone(&model.index),
             surface: Arc::new(self.surface(session)),
             strips: strips.collect(),
@@ -54,36 +67,51 @@ impl ModelSnapshot {
     }
 
     fn surface(&self, session: &Session) -> DisplaySurface {
-        let (mesh, woven) = (&session.model().mesh, session.woven());
-        let refined = &woven.arrangement.refined;
-        let faces: Vec<[u32; 3]> = (0..refined.n_faces() as u32).map(|f| refined.corners(f)).collect();
-        let normals = (0..faces.len() as u32).map(|f| self.face_normals(mesh, refined, f)).collect();
-        // Before the first strip all is one region; to paint it red would say nothing.
-        let regions = if session.design().strips.is_empty() {
-            Vec::new()
-        } else {
-            let color = |&r: &u32| words::color(woven.reports[r as usize].colour);
-            woven.arrangement.region_of_face.iter().map(color).collect()
-        };
-        let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
-        let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
-        let base = (0..refined.n_faces() as u32).map(|f| refined.base_face(f)).collect();
-        DisplaySurface { positions: refined.positions.clone(), faces, normals, base, regions, stripes }
+        match (&self.look, &session.model().proxy) {
+            (Look::Covered(cover), Some(proxy)) => cover.surface(session, proxy),
+            (Look::Covered(_), None) => DisplaySurface::default(),
+            (Look::Itself(normals), _) => refined_surface(normals, session),
+        }
     }
+}
 
-    /// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.
-    fn face_normals(&self, mesh: &TriMesh, refined: &RefinedMesh, f: u32) -> [DVec3; 3] {
-        let base = FaceId(refined.base_face(f));
-        let corners = mesh.face_vertices(base);
-        let normals = self.normals[base.index()];
-        refined.corners(f).map(|v| match corners.iter().position(|c| c.0 == v) {
-            Some(corner) => normals[corner],
-            None => {
-                let weights = weights(corners.map(|c| mesh.position(c)), refined.positions[v as usize]);
-                (0..3).map(|i| normals[i] * weights[i]).sum()
-            }
-        })
+/// A mesh that is woven on itself, refined by its strips.
+fn refined_surface(normals: &[[DVec3; 3]], session: &Session) -> DisplaySurface {
+    let (mesh, woven) = (&session.model().mesh, session.woven());
+    let refined = &woven.arrangement.refined;
+    let faces: Vec<[u32; 3]> = (0..refined.n_faces() as u32).map(|f| refined.corners(f)).collect();
+    let normals = (0..faces.len() as u32).map(|f| face_normals(normals, mesh, refined, f)).collect();
+    // Before the first strip all is one region; to paint it red would say nothing.
+    let regions = if session.design().strips.is_empty() {
+        Vec::new()
+    } else {
+        let color = |&r: &u32| words::color(woven.reports[r as usize].colour);
+        woven.arrangement.region_of_face.iter().map(color).collect()
+    };
+    let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
+    let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
+    DisplaySurface {
+        positions: Arc::new(refined.positions.clone()),
+        base: Arc::new((0..refined.n_faces() as u32).map(|f| refined.base_face(f)).collect()),
+        faces: Arc::new(faces),
+        normals: Arc::new(normals),
+        regions,
+        stripes,
     }
+}
+
+/// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.
+fn face_normals(normals: &[[DVec3; 3]], mesh: &TriMesh, refined: &RefinedMesh, f: u32) -> [DVec3; 3] {
+    let base = FaceId(refined.base_face(f));
+    let corners = mesh.face_vertices(base);
+    let normals = normals[base.index()];
+    refined.corners(f).map(|v| match corners.iter().position(|c| c.0 == v) {
+        Some(corner) => normals[corner],
+        None => {
+            let weights = weights(corners.map(|c| mesh.position(c)), refined.positions[v as usize]);
+            (0..3).map(|i| normals[i] * weights[i]).sum()
+        }
+    })
 }
 
 /// The barycentric coordinates of `p`, which lies in the triangle's plane.
@@ -98,10 +126,13 @@ fn weights(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
 fn facts(session: &Session) -> ModelFacts {
     let model = session.model();
     let mut facts = vec![
-        ("Vertices".to_owned(), grouped(model.mesh.n_vertices())),
-        ("Triangles".to_owned(), grouped(model.mesh.n_faces())),
+        ("Vertices".to_owned(), grouped(model.loaded.mesh.n_vertices())),
+        ("Triangles".to_owned(), grouped(model.loaded.mesh.n_faces())),
         ("Genus".to_owned(), model.topology.genus.to_string()),
     ];
+    if let Some(proxy) = &model.proxy {
+        facts.push(("Woven on a proxy of".to_owned(), grouped(proxy.mesh().n_faces())));
+    }
     let mut several = |name: &str, n: usize, usual: usize| {
         if n != usual {
             facts.push((name.to_owned(), grouped(n)));

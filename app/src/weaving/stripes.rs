@@ -10,15 +10,18 @@ const SPACING: f64 = 0.012;
 
 /// The pattern of each face; `visible` tells which curves show theirs.
 pub fn pattern(map: &StripMap, visible: impl Fn(u32) -> bool) -> Vec<[Option<Stripes>; 2]> {
-    let family = |f: usize, k: usize| {
-        let strip = &map.strips[map.covered[f][k]? as usize];
-        visible(strip.curve).then(|| stripes(strip, map.stripe[f][k].map(f64::from)))
-    };
+    let family = |f: usize, k: usize| covering(map, f, k, &visible).map(|(strip, at)| stripes(strip, at));
     (0..map.covered.len()).map(|f| [family(f, 0), family(f, 1)]).collect()
 }
 
+/// The visible strip of a family that covers a face, and the distances of the face's corners from its spine.
+pub fn covering(map: &StripMap, f: usize, k: usize, visible: impl Fn(u32) -> bool) -> Option<(&Strip, [f64; 3])> {
+    let strip = &map.strips[map.covered[f][k]? as usize];
+    visible(strip.curve).then(|| (strip, map.stripe[f][k].map(f64::from)))
+}
+
 /// Lines at whole fractions of the strip's width on either side, so that it ends with one.
-fn stripes(strip: &Strip, distance: [f64; 3]) -> Stripes {
+pub fn stripes(strip: &Strip, distance: [f64; 3]) -> Stripes {
     let lines = strip.bounds.map(|b| (b / SPACING).round().clamp(1.0, 120.0));
     let side = |d: f64| usize::from(d < 0.0);
     let at = distance.map(|d| d / strip.bounds[side(d)].max(1e-9) * lines[side(d)]);

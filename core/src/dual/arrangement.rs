@@ -252,6 +252,34 @@ impl Arrangement {
         self.segment_of[h as usize]
     }
 
+    /// The half-edges of a curve in order, in one of its two directions: from end to end, or once around.
+    pub fn course(&self, curve: u32) -> Vec<u32> {
+        let refined = &self.refined;
+        let of_curve = |h: &u32| refined.mark(*h) == Mark::Curve(curve);
+        let end = self.ends.iter().find_map(|e| refined.outgoing(e.vertex).into_iter().find(of_curve));
+        let inner = || self.segments.iter().find(|s| s.curve == curve).and_then(|s| s.halfedges.first().copied());
+        let Some(first) = end.or_else(inner) else { return Vec::new() };
+        let mut course = vec![first];
+        let mut h = first;
+        while let Some(onward) = self.straight_on(h).filter(|&g| g != first) {
+            course.push(onward);
+            h = onward;
+        }
+        course
+    }
+
+    /// The half-edge in which a curve goes on after another of its half-edges; `None` at its end.
+    fn straight_on(&self, h: u32) -> Option<u32> {
+        let (v, back) = (self.refined.target(h), self.refined.twin(h));
+        if let Some(i) = self.crossing_index(v) {
+            let spokes = self.crossings[i].spokes;
+            let from = spokes.iter().position(|&g| Some(g) == back)?;
+            return Some(spokes[(from + 2) % 4]);
+        }
+        let marked = |g: &u32| self.refined.mark(*g) != Mark::Free && Some(*g) != back;
+        self.refined.outgoing(v).into_iter().find(marked)
+    }
+
     /// Number of vertices of the mesh before refinement; they come first in the refined mesh.
     pub fn n_base_vertices(&self) -> usize {
         self.n_base_vertices

@@ -177,7 +177,7 @@ fn a_zigzag_leans_away_from_its_edges() {
 }
 
 /// A real mesh, or a note that it is missing.
-fn real(name: &str) -> Option<TriMesh> {
+fn real(name: &str) -> Option<std::sync::Arc<TriMesh>> {
     let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
         || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
         std::path::PathBuf::from,

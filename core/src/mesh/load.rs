@@ -6,6 +6,7 @@
 
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 use thiserror::Error;
@@ -20,7 +21,7 @@ use crate::progress::Progress;
 #[derive(Debug, Clone)]
 pub struct LoadedMesh {
     /// The mesh, centred at the origin and of bounding-box diagonal 1.
-    pub mesh: TriMesh,
+    pub mesh: Arc<TriMesh>,
     /// The way back to the coordinates of the file.
     pub units: Normalization,
     /// What was changed to make it an oriented manifold, in the order done.
@@ -224,7 +225,7 @@ pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<Loade
     let units = Normalization::of(&positions).ok_or(LoadError::NoSize)?;
     let mesh = TriMesh::from_faces(positions.into_iter().map(|p| units.from_file(p)).collect(), &faces)?;
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    Ok(LoadedMesh { mesh, units, repairs, name: stem.to_owned() })
+    Ok(LoadedMesh { mesh: Arc::new(mesh), units, repairs, name: stem.to_owned() })
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
-//! Curves carried from the proxy to the original.
+//! Curves carried from the proxy to the original and back.
 //!
 //! The images of the original's vertices lie on one side or the other of the curve. In a triangle of the original the
 //! sides of the corners differ along two edges or none; so the edges between the sides form a strip, which is
 //! followed from triangle to triangle once around. Sides are taken from the part of the curve near by, counted along
 //! it, so that a curve may meet itself. The strip accompanies the curve at less than an edge, and its progress along
-//! the curve is watched: it makes just one turn, and is therefore in the same homotopy class.
+//! the curve is watched: it makes just one turn, and is therefore in the same homotopy class. The way back is the same
+//! walk over the proxy, along the images of the curve's points.
 
 use glam::DVec3;
 use thiserror::Error;
@@ -26,19 +27,23 @@ const JOIN: usize = 200;
 /// The carried curve is as long as the curve up to this factor.
 const LENGTH_FACTOR: f64 = 1.6;
 
-/// Why a curve cannot be carried to the original.
+/// Points of a curve of the original less than this apart, in mean edges of the proxy, are one point of its image:
+/// places along the guide are then of like length whichever way a curve is carried.
+const APART: f64 = 0.5;
+
+/// Why a curve cannot be carried to the other mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CarryError {
-    /// The curve is not one on the proxy.
+    /// The curve is not one on the mesh it is carried from.
     #[error(transparent)]
     Curve(#[from] CurveError),
-    /// The original has no strip of triangles along the curve that closes, or that ends where the curve does.
-    #[error("the curve has no counterpart on the original")]
+    /// The other mesh has no strip of triangles along the curve that closes, or that ends where the curve does.
+    #[error("the curve has no counterpart between mesh and proxy")]
     Lost,
     /// The curve found is of quite another length: the original is too rough there.
-    #[error("on the original the curve would be {ratio:.1} times as long")]
+    #[error("carried between mesh and proxy the curve would be {ratio:.1} times as long")]
     Length {
-        /// Its length there by its length on the proxy.
+        /// Its length there by its length here.
         ratio: f64,
     },
 }
@@ -79,6 +84,55 @@ impl Guide {
         };
         let edges: f64 = curve.crossings.iter().map(|c| mesh.vector(c.halfedge).length()).sum();
         Self { segments: (0..count).map(segment).collect(), closed: curve.closed, reach: REACH * edges / n as f64 }
+    }
+
+    /// A line on the proxy: its points, each with the face in which it goes on to the next.
+    fn along(mesh: &TriMesh, line: &[(DVec3, FaceId)], closed: bool) -> Self {
+        let n = line.len();
+        let segment = |k: usize| {
+            let ((from, face), (to, _)) = (line[k], line[(k + 1) % n]);
+            Segment { from, to, left: mesh.face_normal(face).cross(to - from).normalize_or_zero(), face }
+        };
+        let segments = (0..if closed { n } else { n - 1 }).map(segment).collect();
+        Self { segments, closed, reach: REACH * mean_edge(mesh, line) }
+    }
+
+    /// The image on the proxy of a curve of the original.
+    fn image(proxy: &Proxy, original: &TriMesh, curve: &SurfaceCurve) -> Self {
+        let mesh = proxy.mesh();
+        let image = |i: usize| {
+            let at = proxy.to_proxy(original, curve.surface_point(original, i));
+            (at.position(mesh), at.face)
+        };
+        let all: Vec<(DVec3, FaceId)> = (0..curve.crossings.len()).map(image).collect();
+        let edge = mean_edge(mesh, &all);
+        let mut points: Vec<(DVec3, FaceId)> = Vec::new();
+        for &p in &all {
+            if points.last().is_none_or(|last| last.0.distance(p.0) >= APART * edge) {
+                points.push(p);
+            }
+        }
+        let (&first, &end) = (&all[0], &all[all.len() - 1]);
+        let near = |p: DVec3, q: DVec3| p.distance(q) < APART * edge;
+        if curve.closed {
+            while points.len() > 3 && points.last().is_some_and(|last| near(last.0, first.0)) {
+                points.pop();
+            }
+        } else {
+            // The end on the boundary counts, not what comes just before it.
+            if points.len() > 1 && points.last().is_some_and(|last| near(last.0, end.0)) {
+                points.pop();
+            }
+            points.push(end);
+        }
+        let n = points.len();
+        let segment = |k: usize| {
+            let ((from, face), (to, other)) = (points[k], points[(k + 1) % n]);
+            let up = mesh.face_normal(face) + mesh.face_normal(other);
+            Segment { from, to, left: up.cross(to - from).normalize_or_zero(), face }
+        };
+        let count = if curve.closed { n } else { n - 1 };
+        Self { segments: (0..count).map(segment).collect(), closed: curve.closed, reach: REACH * edge }
     }
 
     /// The segment after or before another.
@@ -135,9 +189,24 @@ impl Guide {
         if self.closed { way - n * (way / n).round() } else { way }
     }
 
+    /// Whether two places are much less than the reach apart.
+    fn is_near(&self, a: f64, b: f64) -> bool {
+        let place = |at: f64| {
+            let k = (at.max(0.0) as usize).min(self.segments.len() - 1);
+            self.segments[k].from.lerp(self.segments[k].to, at - k as f64)
+        };
+        self.way(a, b).abs() < 3.0 || place(a).distance(place(b)) < 0.5 * self.reach
+    }
+
     fn length(&self) -> f64 {
         self.segments.iter().map(|s| s.from.distance(s.to)).sum()
     }
+}
+
+/// The mean length of an edge of the faces along a line.
+fn mean_edge(mesh: &TriMesh, line: &[(DVec3, FaceId)]) -> f64 {
+    let edge = |f: FaceId| mesh.vector(mesh.face_halfedges(f)[0]).length();
+    line.iter().map(|p| edge(p.1)).sum::<f64>() / line.len().max(1) as f64
 }
 
 impl Proxy {
@@ -150,14 +219,66 @@ impl Proxy {
     pub fn curve_to_original(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
         curve.check(self.mesh())?;
         let guide = Guide::new(self.mesh(), curve);
-        let walker = Walker { original, places: self.places(), guide: &guide };
+        let walker = Walker { mesh: original, places: self.places(), guide: &guide };
+        walker.follow(self, |point| self.to_original(original, point).face)
+    }
+
+    /// As [`Self::curve_to_original`] for a line over the proxy: its points, each with the face in which it goes on to
+    /// the next, from boundary to boundary unless it is closed.
+    ///
+    /// # Errors
+    ///
+    /// An original too rough along it.
+    pub fn line_to_original(
+        &self,
+        original: &TriMesh,
+        line: &[(DVec3, FaceId)],
+        closed: bool,
+    ) -> Result<SurfaceCurve, CarryError> {
+        if line.len() < 2 {
+            return Err(CarryError::Lost);
+        }
+        let guide = Guide::along(self.mesh(), line, closed);
+        let walker = Walker { mesh: original, places: self.places(), guide: &guide };
+        walker.follow(self, |point| self.to_original(original, point).face)
+    }
+
+    /// The curve on the proxy that goes as `curve` goes on the original, as [`Self::curve_to_original`] the other way.
+    ///
+    /// # Errors
+    ///
+    /// A curve that is not one on the original, or one smaller than the triangles of the proxy.
+    pub fn curve_to_proxy(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
+        curve.check(original)?;
+        let guide = Guide::image(self, original, curve);
+        let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide: &guide };
+        walker.follow(self, |point| point.face)
+    }
+}
+
+/// Follows a guide over a mesh as it is laid onto the proxy.
+struct Walker<'a> {
+    mesh: &'a TriMesh,
+    /// Where its vertices lie on the proxy.
+    places: &'a [DVec3],
+    guide: &'a Guide,
+}
+
+impl Walker<'_> {
+    /// The curve along the guide; `face_at` finds the face at a point of the proxy.
+    fn follow(&self, proxy: &Proxy, face_at: impl Fn(SurfacePoint) -> FaceId) -> Result<SurfaceCurve, CarryError> {
+        let (mesh, guide) = (self.mesh, self.guide);
         let n = guide.segments.len();
+        let t = if guide.closed { 0.5 } else { 0.0 };
         let mut error = CarryError::Lost;
-        for i in 0..if curve.closed { STARTS.min(n) } else { 1 } {
+        for i in 0..if guide.closed { STARTS.min(n) } else { 1 } {
             let k = i * n / STARTS.min(n);
-            let Some(start) = self.start(original, &walker, k) else { continue };
-            match walker.walk(start) {
-                Ok(carried) if carried.check(original).is_ok() => return Ok(carried),
+            let s = &guide.segments[k];
+            let corners = proxy.mesh().face_vertices(s.face).map(|v| proxy.mesh().position(v));
+            let on_proxy = SurfacePoint { face: s.face, weights: nearest_in_triangle(s.from.lerp(s.to, t), &corners) };
+            let Some(start) = self.start(face_at(on_proxy), k as f64 + t) else { continue };
+            match self.walk(start) {
+                Ok(carried) if carried.check(mesh).is_ok() => return Ok(carried),
                 Ok(_) => {}
                 Err(e) => error = e,
             }
@@ -165,31 +286,28 @@ impl Proxy {
         Err(error)
     }
 
-    /// The half-edge through which the walk along segment `k` first leaves a triangle; for an open curve the one on
-    /// the boundary through which it enters.
-    fn start(&self, original: &TriMesh, walker: &Walker<'_>, k: usize) -> Option<(HalfedgeId, f64)> {
-        let s = &walker.guide.segments[k];
-        let t = if walker.guide.closed { 0.5 } else { 0.0 };
-        let corners = self.mesh().face_vertices(s.face).map(|v| self.mesh().position(v));
-        let on_proxy = SurfacePoint { face: s.face, weights: nearest_in_triangle(s.from.lerp(s.to, t), &corners) };
-        let mut near = vec![self.to_original(original, on_proxy).face];
+    /// The half-edge near a face through which the walk from a place of the guide first leaves a triangle; for an open
+    /// guide the one on the boundary through which it enters.
+    fn start(&self, face: FaceId, at: f64) -> Option<(HalfedgeId, f64)> {
+        let (mesh, guide) = (self.mesh, self.guide);
+        let mut near = vec![face];
         let mut next = 0;
         while next < near.len().min(AROUND) {
-            let sides = original.face_halfedges(near[next]);
+            let sides = mesh.face_halfedges(near[next]);
             for h in sides {
-                let ends = [original.origin(h), original.target(h)].map(|v| walker.side(v, k as f64 + t));
-                let crosses = if walker.guide.closed {
+                let ends = [mesh.origin(h), mesh.target(h)].map(|v| self.side(v, at));
+                let crosses = if guide.closed {
                     ends[0].distance < 0.0 && ends[1].distance >= 0.0
                 } else {
-                    original.twin(h).is_none() && ends[0].distance >= 0.0 && ends[1].distance < 0.0
+                    mesh.twin(h).is_none() && ends[0].distance >= 0.0 && ends[1].distance < 0.0
                 };
                 // Beyond the ends of the part looked at, sides mean nothing.
-                let way = ends.map(|e| walker.guide.way(k as f64 + t, e.at).abs());
-                if crosses && ends.iter().all(|e| e.distance.abs() < walker.guide.reach) && way[0].min(way[1]) < 3.0 {
-                    return Some((h, k as f64 + t));
+                let near = |e: &Side| e.distance.abs() < guide.reach;
+                if crosses && ends.iter().all(near) && ends.iter().any(|e| guide.is_near(at, e.at)) {
+                    return Some((h, at));
                 }
             }
-            for f in sides.into_iter().filter_map(|h| original.twin(h)).map(|g| original.face(g)) {
+            for f in sides.into_iter().filter_map(|h| mesh.twin(h)).map(|g| mesh.face(g)) {
                 if !near.contains(&f) {
                     near.push(f);
                 }
@@ -198,23 +316,14 @@ impl Proxy {
         }
         None
     }
-}
 
-/// Follows a guide over the original as it is laid onto the proxy.
-struct Walker<'a> {
-    original: &'a TriMesh,
-    places: &'a [DVec3],
-    guide: &'a Guide,
-}
-
-impl Walker<'_> {
     fn side(&self, v: VertexId, at: f64) -> Side {
         self.guide.side(self.places[v.index()], at)
     }
 
     /// Walks from a half-edge, near a place on the guide, until the curve is closed or at the boundary.
     fn walk(&self, (mut first, at): (HalfedgeId, f64)) -> Result<SurfaceCurve, CarryError> {
-        let (mesh, guide) = (self.original, self.guide);
+        let (mesh, guide) = (self.mesh, self.guide);
         let n = guide.segments.len() as f64;
         let mut ends = [mesh.origin(first), mesh.target(first)].map(|v| (v, self.side(v, at).distance));
         let (mut h, mut at, mut gone, mut length) = (first, at, 0.0, 0.0);

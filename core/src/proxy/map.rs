@@ -99,6 +99,16 @@ impl Proxy {
         nearest_near(original, &self.places, near, target).unwrap_or(point)
     }
 
+    /// Moves the vertices of the proxy, and all images with them.
+    pub(super) fn move_to(&mut self, positions: Vec<DVec3>) {
+        let faces: Vec<[u32; 3]> = self.mesh.faces().map(|f| self.mesh.face_vertices(f).map(|v| v.0)).collect();
+        // The same faces as before over finite positions: a manifold as before.
+        if let Ok(mesh) = TriMesh::from_faces(positions, &faces) {
+            self.mesh = mesh;
+            self.places = self.images.iter().map(|p| p.position(&self.mesh)).collect();
+        }
+    }
+
     /// Puts a finished simplification together.
     pub(super) fn finish(
         original: &TriMesh,

@@ -13,6 +13,7 @@ mod improve;
 mod map;
 mod quadric;
 mod shape;
+mod smooth;
 mod star;
 
 use thiserror::Error;

@@ -9,6 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::SurfacePoint;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
 /// The place where a curve crosses a mesh edge.
@@ -74,6 +75,15 @@ impl SurfaceCurve {
     pub fn point(&self, mesh: &TriMesh, i: usize) -> DVec3 {
         let c = self.crossings[i];
         mesh.position(mesh.origin(c.halfedge)).lerp(mesh.position(mesh.target(c.halfedge)), c.t)
+    }
+
+    /// Crossing `i` as a point of the triangle left there.
+    pub fn surface_point(&self, mesh: &TriMesh, i: usize) -> SurfacePoint {
+        let Crossing { halfedge, t } = self.crossings[i];
+        let mut weights = [0.0; 3];
+        let corner = halfedge.index() % 3;
+        (weights[corner], weights[(corner + 1) % 3]) = (1.0 - t, t);
+        SurfacePoint { face: mesh.face(halfedge), weights }
     }
 
     /// The points at all crossings; a closed curve does not repeat its first.

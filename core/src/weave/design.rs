@@ -21,10 +21,20 @@ pub struct Strip {
     pub id: StripId,
     /// Its spine, on the mesh of the design.
     pub curve: SurfaceCurve,
+    /// The same on the proxy it was woven on, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub on_proxy: Option<SurfaceCurve>,
     /// Cost of the loop when it was found.
     pub cost: f64,
     /// Whether it is drawn.
     pub visible: bool,
+}
+
+impl Strip {
+    /// Its spine on the mesh that is woven on.
+    pub fn woven(&self) -> &SurfaceCurve {
+        self.on_proxy.as_ref().unwrap_or(&self.curve)
+    }
 }
 
 /// A part of the layout that is to stay where it is when the embedding is optimised. It is told by a point of the first
@@ -82,6 +92,9 @@ pub struct Design {
     pub fingerprint: String,
     /// The options.
     pub options: Options,
+    /// Fingerprint of the proxy that strips were woven on, to notice when another program makes another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proxy: Option<String>,
     /// The strips in the order placed.
     pub strips: Vec<Strip>,
     /// What of their layout is to stay where it is.
@@ -92,8 +105,8 @@ pub struct Design {
 impl Design {
     /// A design without strips.
     pub fn new(source: MeshSource, mesh: &TriMesh, options: Options) -> Self {
-        let (strips, pins) = (Vec::new(), Vec::new());
-        Self { version: VERSION, mesh: source, fingerprint: fingerprint(mesh), options, strips, pins }
+        let (proxy, strips, pins) = (None, Vec::new(), Vec::new());
+        Self { version: VERSION, mesh: source, fingerprint: fingerprint(mesh), options, proxy, strips, pins }
     }
 
     /// Reads a design.

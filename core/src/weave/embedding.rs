@@ -3,12 +3,15 @@
 use glam::DVec3;
 
 use super::design::Pin;
+use super::ground::{Ground, alike};
+use super::model::{Model, features};
 use super::session::{Session, WeaveError};
-use crate::dual::RegionReport;
-use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, Surface, headings};
+use crate::dual::{Arrangement, Colour, RegionReport, assess, vertex_curvatures};
+use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
+use crate::surface::SurfaceCurve;
 
 /// A layout and a drawing of it.
 #[derive(Debug, Clone)]
@@ -17,6 +20,8 @@ pub struct Drawn {
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
+    /// The mesh that they are drawn on.
+    pub ground: Ground,
 }
 
 /// Which nodes and arcs are pinned.
@@ -45,30 +50,113 @@ impl PinnedParts {
     }
 }
 
-/// The layout of a session in its first drawing.
+/// Triangles up to which a mesh that is woven on a proxy has the layout embedded on itself; beyond, the optimisation takes
+/// minutes and gigabytes for what quads much larger than the triangles do not show.
+const EMBEDDED: usize = 150_000;
+
+/// The layout of a session in its first drawing. With a proxy it is drawn on the mesh of the design where the strips make
+/// the same layout there and the mesh is not too large, and else on the proxy.
 ///
 /// # Errors
 ///
 /// [`crate::layout::LayoutError::RedRegions`] while there are red regions.
 pub fn draw(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
+    if model.proxy.is_some()
+        && model.loaded.mesh.n_faces() <= EMBEDDED
+        && woven.red().is_empty()
+        && let Some(drawn) = draw_on_design(session, progress)?
+    {
+        return Ok(drawn);
+    }
+    draw_as_woven(session, progress)
+}
+
+/// The drawing on the mesh that is woven on.
+pub(super) fn draw_as_woven(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
+    let (model, woven) = (session.model(), session.woven());
     let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
     progress.report("Drawing nodes and arcs", 0.1);
-    let embedding = embed(&woven.arrangement, &layout, &preferred_nodes(session, &layout), progress)?;
-    Ok(Drawn { layout, embedding })
+    let (sharp, curved) = (&model.sharp, &model.vertex_curvatures);
+    let preferred = preferred_nodes(&woven.arrangement, &layout, &woven.reports, &model.mesh, sharp, curved);
+    let embedding = embed(&woven.arrangement, &layout, &preferred, progress)?;
+    let ground = if model.proxy.is_some() { Ground::Proxy } else { Ground::Design };
+    Ok(Drawn { layout, embedding, ground })
+}
+
+/// The drawing on the mesh of the design; `None` where the strips, carried there, do not make the same layout.
+fn draw_on_design(session: &Session, progress: &Progress) -> Result<Option<Drawn>, WeaveError> {
+    let (model, mesh) = (session.model(), &session.model().loaded.mesh);
+    progress.report("Arranging strips on the whole mesh", 0.02);
+    let Some(arrangement) = arranged_on_design(session, progress)? else {
+        tracing::warn!("the strips make another layout on the mesh than on the proxy: embedded on the proxy");
+        return Ok(None);
+    };
+    progress.check()?;
+    let curved = vertex_curvatures(mesh);
+    let reports = assess(&arrangement, &curved, &corners_on_design(model));
+    let red: Vec<u32> = (0..reports.len() as u32).filter(|&r| reports[r as usize].colour == Colour::Red).collect();
+    let layout = QuadLayout::dual(&arrangement, &red, mesh.euler_characteristic())?;
+    progress.report("Drawing nodes and arcs", 0.1);
+    let sharp = features(mesh, &model.options);
+    let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &sharp, &curved);
+    let embedding = embed(&arrangement, &layout, &preferred, progress)?;
+    Ok(Some(Drawn { layout, embedding, ground: Ground::Design }))
+}
+
+/// The arrangement on the mesh of the design that is like the one on the proxy, if there is one: of the strips as they were
+/// carried one by one, or else as they are drawn beside each other now.
+fn arranged_on_design(session: &Session, progress: &Progress) -> Result<Option<Arrangement>, WeaveError> {
+    let (mesh, woven) = (&session.model().loaded.mesh, &session.woven().arrangement);
+    let like =
+        |curves: &[&SurfaceCurve]| Arrangement::new(mesh, curves.iter().copied()).ok().filter(|a| alike(a, woven));
+    let placed: Vec<&SurfaceCurve> = session.design().strips.iter().map(|s| &s.curve).collect();
+    if let Some(arrangement) = like(&placed) {
+        return Ok(Some(arrangement));
+    }
+    progress.check()?;
+    let drawn: Option<Vec<SurfaceCurve>> = (0..placed.len()).map(|i| drawn_on_design(session, i)).collect();
+    Ok(drawn.and_then(|curves| like(&curves.iter().collect::<Vec<_>>())))
+}
+
+/// A strip as it is drawn between the others on the proxy, on the mesh of the design.
+fn drawn_on_design(session: &Session, strip: usize) -> Option<SurfaceCurve> {
+    let (model, arrangement) = (session.model(), &session.woven().arrangement);
+    let refined = &arrangement.refined;
+    let face = |h: u32| FaceId(refined.base_face(h / 3));
+    let at = |v: u32| refined.positions[v as usize];
+    let course = arrangement.course(strip as u32);
+    let mut line: Vec<(DVec3, FaceId)> = course.iter().map(|&h| (at(refined.origin(h)), face(h))).collect();
+    let (closed, &last) = (session.design().strips[strip].curve.closed, course.last()?);
+    if !closed {
+        line.push((at(refined.target(last)), face(last)));
+    }
+    model.proxy.as_ref()?.line_to_original(&model.loaded.mesh, &line, closed).ok()
+}
+
+/// The pronounced corners of the shape by vertices of the design's mesh.
+fn corners_on_design(model: &Model) -> Vec<(VertexId, i8)> {
+    let vertex = |v| model.proxy.as_ref().map_or(v, |p| p.original_vertex(v));
+    model.corners.iter().map(|&(v, index)| (vertex(v), index)).collect()
 }
 
 /// Where the node of each region is to lie: at its only pronounced corner, or where there is none, at that corner of its
-/// features which is curved most in the sense of the node.
-fn preferred_nodes(session: &Session, layout: &QuadLayout) -> Vec<Option<VertexId>> {
-    let (model, woven) = (session.model(), session.woven());
-    let sharp_corner = feature_corners(&model.mesh, &model.sharp);
+/// features which is `curved` most in the sense of the node.
+fn preferred_nodes(
+    arrangement: &Arrangement,
+    layout: &QuadLayout,
+    reports: &[RegionReport],
+    mesh: &TriMesh,
+    sharp: &[bool],
+    curved: &[f64],
+) -> Vec<Option<VertexId>> {
+    let is_corner = feature_corners(mesh, sharp);
     let of_features = |r: usize| {
         let sense = 4.0 - layout.nodes[r].valence as f64;
-        let curved = |v: &VertexId| sense * model.vertex_curvatures[v.index()];
-        let faces = woven.arrangement.regions[r].faces.iter();
-        let corners = faces.flat_map(|&f| woven.arrangement.refined.corners(f)).map(VertexId);
-        let candidates = corners.filter(|v| sharp_corner.get(v.index()).copied().unwrap_or(false));
+        let curved = |v: &VertexId| sense * curved[v.index()];
+        let faces = arrangement.regions[r].faces.iter();
+        let corners = faces.flat_map(|&f| arrangement.refined.corners(f)).map(VertexId);
+        let candidates = corners.filter(|v| is_corner.get(v.index()).copied().unwrap_or(false));
         let best = candidates.max_by(|a, b| curved(a).total_cmp(&curved(b)).then(b.cmp(a)));
         best.filter(|v| curved(v) > 0.0)
     };
@@ -77,7 +165,7 @@ fn preferred_nodes(session: &Session, layout: &QuadLayout) -> Vec<Option<VertexI
         [] if !layout.nodes[r].boundary => of_features(r),
         _ => None,
     };
-    woven.reports.iter().enumerate().map(of).collect()
+    reports.iter().enumerate().map(of).collect()
 }
 
 /// Whether three or more sharp edges meet at each vertex.
@@ -151,7 +239,7 @@ pub fn optimise(
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<Embedded, EmbeddingError> {
     let model = session.model();
-    let surface = Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp };
+    let surface = model.surface(drawn.ground);
     let headings = headings(&drawn.layout);
     let job = Job {
         surface,

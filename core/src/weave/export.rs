@@ -8,15 +8,18 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::embedding::{Drawn, draw};
+use super::ground::Ground;
 use super::report::{Before, Subject, Times, write_report};
 use super::session::{Session, WeaveError};
 use crate::embed::{
     self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings,
 };
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
-use crate::mesh::{Normalization, write_obj};
+use crate::mesh::{FaceId, Normalization, TriMesh, write_obj};
 use crate::progress::Progress;
+use crate::proxy::Proxy;
 use crate::quad::{QuadMesh, chord_counts, land, quality, refine, smooth, whole_counts};
+use crate::surface::{SurfacePoint, nearest_in_triangle};
 use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
@@ -73,6 +76,8 @@ pub type Watch<'a> = &'a mut dyn FnMut(&Snapshot) -> Next;
 pub struct Sketch<'a> {
     /// The surface.
     pub surface: Surface<'a>,
+    /// Where the surface is a proxy: its maps, and the mesh that the quads are to lie on.
+    pub proxy: Option<(&'a Proxy, &'a TriMesh)>,
     /// Its place and size in the file.
     pub units: Normalization,
     /// The layout, without patches where arcs are missing, and its drawing.
@@ -90,6 +95,8 @@ pub struct Export {
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
+    /// The mesh that layout, embedding and maps are on; the quads always lie on that of the design.
+    pub ground: Ground,
     /// The maps of its patches.
     pub maps: Vec<PatchMap>,
     /// Its refinement.
@@ -118,14 +125,25 @@ fn export_session(
     progress: &Progress,
     watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
+    export_drawn(session, &draw(session, progress)?, embedded, options, progress, watch)
+}
+
+pub(super) fn export_drawn(
+    session: &Session,
+    drawn: &Drawn,
+    embedded: Option<&Embedded>,
+    options: &ExportOptions,
+    progress: &Progress,
+    watch: Watch<'_>,
+) -> Result<Export, WeaveError> {
     let model = session.model();
-    let drawn = draw(session, progress)?;
     let sketch = Sketch {
-        surface: Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp },
+        surface: model.surface(drawn.ground),
+        proxy: model.proxy.as_ref().map(|p| (p, &*model.loaded.mesh)).filter(|_| drawn.ground == Ground::Proxy),
         units: model.loaded.units,
         headings: &headings(&drawn.layout),
         pinned: &drawn.pinned(&session.design().pins),
-        drawn: &drawn,
+        drawn,
     };
     finish(&sketch, embedded, options, progress, watch)
 }
@@ -144,7 +162,7 @@ pub fn finish(
     watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
     let Sketch { surface, drawn, headings, pinned, .. } = *sketch;
-    let Drawn { layout, embedding: drawing } = drawn;
+    let Drawn { layout, embedding: drawing, ground } = drawn;
     let mut seconds = Times::new();
     let start = Instant::now();
     let edge = edge_length(options.size, sketch);
@@ -203,7 +221,7 @@ pub fn finish(
     let quads = quads(sketch, (&layout, &embedding, &maps), done, &counts, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
-    Ok(Export { layout, embedding, maps, quads, optimised, before, seconds })
+    Ok(Export { layout, embedding, ground: *ground, maps, quads, optimised, before, seconds })
 }
 
 /// Why an optimised embedding is no better than the drawing, if so.
@@ -224,14 +242,33 @@ fn quads(
     let surface = sketch.surface;
     progress.report("Refining to quads", 0.97);
     let mut quads = refine(layout, embedding, maps, counts);
-    if optimised {
+    if optimised || sketch.proxy.is_some() {
         land(&mut quads, surface.mesh);
     }
+    let mesh = match sketch.proxy {
+        Some((proxy, original)) => {
+            carry(&mut quads, proxy, original);
+            land(&mut quads, original);
+            original
+        }
+        None => surface.mesh,
+    };
     // Smoothing betters all figures of a smooth surface, but takes vertices off the features they were aligned to.
     if !optimised || !surface.sharp.contains(&true) || quality(&quads).0 > 0 {
-        smooth(&mut quads, surface.mesh, progress)?;
+        smooth(&mut quads, mesh, progress)?;
     }
     Ok(quads)
+}
+
+/// Carries quads from the proxy to the mesh it stands for.
+fn carry(quads: &mut QuadMesh, proxy: &Proxy, original: &TriMesh) {
+    let mesh = proxy.mesh();
+    for (position, face) in quads.positions.iter_mut().zip(&mut quads.base_face) {
+        let corners = mesh.face_vertices(FaceId(*face)).map(|v| mesh.position(v));
+        let at = SurfacePoint { face: FaceId(*face), weights: nearest_in_triangle(*position, &corners) };
+        let at = proxy.to_original(original, at);
+        (*position, *face) = (at.position(original), at.face.0);
+    }
 }
 
 /// The edge length of quads before patches are mapped, on a surface of bounding-box diagonal 1.
@@ -302,8 +339,8 @@ impl Export {
     }
 }
 
-/// Writes `design.plait` and `report.json`, and of a valid layout the meshes and `layout.layout`; the inner result is
-/// the layout, or why there is none.
+/// Writes `design.plait` and `report.json`, and of a valid layout the meshes and, unless it is embedded on a proxy,
+/// `layout.layout`; the inner result is the layout, or why there is none.
 ///
 /// `embedded` is the optimised embedding, where there is one already; `seconds` are times to note in the report.
 ///
@@ -326,14 +363,21 @@ pub fn write_all(
     let (model, design) = (session.model(), session.design());
     if let Ok(export) = &result {
         export.write(folder, &model.loaded.units)?;
+    }
+    // A layout file is about the mesh of the design.
+    if let Ok(export) = &result
+        && export.ground == Ground::Design
+    {
         let drawing = &export.before.drawing;
-        let mut file = LayoutFile::from_embedding(design.mesh.clone(), &model.mesh, &export.layout, drawing)?;
-        let pinned = Drawn { layout: export.layout.clone(), embedding: drawing.clone() }.pinned(&design.pins);
+        let (layout, embedding) = (export.layout.clone(), drawing.clone());
+        let pinned = Drawn { layout, embedding, ground: export.ground }.pinned(&design.pins);
+        let mesh = &model.loaded.mesh;
+        let mut file = LayoutFile::from_embedding(design.mesh.clone(), mesh, &export.layout, drawing)?;
         file.nodes.iter_mut().zip(pinned.nodes).for_each(|(node, pinned)| node.fixed = pinned);
         file.arcs.iter_mut().zip(pinned.arcs).for_each(|(arc, pinned)| arc.fixed = pinned);
         file.write(&folder.join("layout.layout"))?;
     }
-    write_report(folder, Subject::Session(session), &result, seconds, &model.mesh)?;
+    write_report(folder, Subject::Session(session), &result, seconds, &model.loaded.mesh)?;
     Ok(result)
 }
 

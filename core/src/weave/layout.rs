@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::embedding::{Drawn, PinnedParts};
 use super::export::{Export, ExportOptions, Sketch, Watch, finish, make_folder};
+use super::ground::Ground;
 use super::model::{Options, features};
 use super::report::{Subject, Times, write_report};
 use super::session::WeaveError;
@@ -59,7 +60,7 @@ impl OpenedLayout {
         let curvature = principal_curvature(&loaded.mesh, options.curvature_radius, &sharp);
         progress.check()?;
         let (topology, headings) = (Topology::new(&loaded.mesh), drawing.arc_headings());
-        let drawn = Drawn { layout, embedding };
+        let drawn = Drawn { layout, embedding, ground: Ground::Design };
         Ok(Self { file, loaded, topology, index, curvature, sharp, drawn, headings, pinned })
     }
 
@@ -95,9 +96,10 @@ impl OpenedLayout {
         watch: Watch<'_>,
     ) -> Result<Result<Export, WeaveError>, WeaveError> {
         make_folder(folder)?;
-        let mesh = &self.loaded.mesh;
+        let mesh = &*self.loaded.mesh;
         let sketch = Sketch {
             surface: Surface { mesh, index: &self.index, curvature: &self.curvature, sharp: &self.sharp },
+            proxy: None,
             units: self.loaded.units,
             drawn: &self.drawn,
             headings: &self.headings,

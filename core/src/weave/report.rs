@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::design::Strip;
 use super::export::{Export, write_file};
+use super::ground::Ground;
 use super::session::{Session, WeaveError};
 use crate::dual::{Colour, RegionReport};
 use crate::embed::{CollapsedChord, Measures, ShortChord, Surface, face_curvature, measure_patches};
@@ -65,10 +66,20 @@ struct Report<'a> {
 
 #[derive(Serialize)]
 struct Weaving<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    proxy: Option<ProxySection>,
     strips: Vec<StripReport>,
     crossings: usize,
     regions: &'a [RegionReport],
     colours: Colours,
+}
+
+/// The proxy that strips were woven on.
+#[derive(Serialize)]
+struct ProxySection {
+    triangles: usize,
+    /// Whether the layout, too, is embedded on the proxy, and its quads were then carried to the mesh.
+    embedded: bool,
 }
 
 /// Counts of one colour.
@@ -171,7 +182,8 @@ pub(super) fn write_report(
 ) -> Result<(), WeaveError> {
     let (loaded, topology, weaving) = match subject {
         Subject::Session(session) => {
-            (&session.model().loaded, &session.model().topology, Some(weaving_report(session)))
+            let on_proxy = result.as_ref().is_ok_and(|e| e.ground == Ground::Proxy);
+            (&session.model().loaded, &session.model().topology, Some(weaving_report(session, on_proxy)))
         }
         Subject::File(loaded, topology) => (loaded, topology, None),
     };
@@ -194,16 +206,17 @@ pub(super) fn write_report(
     write_file(&folder.join("report.json"), |out| writeln!(out, "{text}"))
 }
 
-fn weaving_report(session: &Session) -> Weaving<'_> {
+fn weaving_report(session: &Session, embedded: bool) -> Weaving<'_> {
     let (model, woven) = (session.model(), session.woven());
     let scale = model.loaded.units.scale;
     let strip = |s: &Strip| StripReport {
         id: s.id.0,
         closed: s.curve.closed,
-        length: s.curve.length(&model.mesh) * scale,
+        length: s.curve.length(&model.loaded.mesh) * scale,
         cost: s.cost,
     };
     Weaving {
+        proxy: model.proxy.as_ref().map(|p| ProxySection { triangles: p.mesh().n_faces(), embedded }),
         strips: session.design().strips.iter().map(strip).collect(),
         crossings: woven.arrangement.crossings.len(),
         regions: &woven.reports,

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::design::{Design, DesignError, Pin, Strip, StripId};
+use super::ground::alike;
 use super::model::{Model, Options};
 use super::recent::RecentSearches;
 use super::suggest::Stuck;
@@ -16,8 +17,9 @@ use crate::elastica::{Certainty, ElasticaError, ElasticaGraph, FoundLoop};
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
 use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
-use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh};
+use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh, fingerprint};
 use crate::progress::{Cancelled, Progress};
+use crate::proxy::CarryError;
 use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
 
 /// Whatever can go wrong while weaving.
@@ -41,6 +43,9 @@ pub enum WeaveError {
     /// The design could not be read, written or replayed.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// A strip woven on a proxy has no counterpart on the mesh itself.
+    #[error("the strip cannot be placed here: {0}")]
+    Carry(#[from] CarryError),
     /// There is no valid layout yet.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -84,14 +89,14 @@ pub enum WeaveError {
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// Its spine.
+    /// Its spine, on the mesh that is woven on.
     pub curve: SurfaceCurve,
     /// Cost of the loop that was found.
     pub cost: f64,
 }
 
 impl Proposal {
-    /// The spine as points in space.
+    /// The spine as points in space; `mesh` is the one that is woven on.
     pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
         self.curve.points(mesh)
     }
@@ -138,9 +143,16 @@ impl Session {
     /// # Errors
     ///
     /// See [`Model::prepare`]; [`DesignError::OtherMesh`] when the design was made on another mesh.
-    pub fn resume(loaded: LoadedMesh, design: Design, progress: &Progress) -> Result<Self, WeaveError> {
+    pub fn resume(loaded: LoadedMesh, mut design: Design, progress: &Progress) -> Result<Self, WeaveError> {
         design.check_mesh(&loaded.mesh)?;
-        let model = Arc::new(Model::prepare(loaded, design.options, progress)?);
+        let mut model = Model::prepare(loaded, design.options, progress)?;
+        if !on_proxy(&model, &mut design)? {
+            tracing::warn!("the strips do not fit the proxy: woven without one");
+            let options = Options { proxy: 0, smoothing: 0.0, ..design.options };
+            model = Model::prepare(model.loaded, options, progress)?;
+            on_proxy(&model, &mut design)?;
+        }
+        let model = Arc::new(model);
         let woven = Arc::new(Woven::new(&model, &design.strips, progress)?);
         let next_id = design.strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
         let (undo, redo, recent) = (Vec::new(), Vec::new(), RecentSearches::default());
@@ -167,7 +179,7 @@ impl Session {
         &self.woven
     }
 
-    /// The strips that could be placed through a point, the best first.
+    /// The strips that could be placed through a point of the design's mesh, the best first.
     ///
     /// # Errors
     ///
@@ -188,6 +200,7 @@ impl Session {
         progress: &Progress,
         mut first: impl FnMut(Proposal),
     ) -> Result<Vec<Proposal>, WeaveError> {
+        let at = self.model.to_woven(at);
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
         let polished = |l: &FoundLoop| polished(graph, l, at, progress);
@@ -218,7 +231,9 @@ impl Session {
     pub fn place(&mut self, proposal: Proposal, progress: &Progress) -> Result<StripId, WeaveError> {
         let id = StripId(self.next_id);
         let mut strips = self.design.strips.clone();
-        strips.push(Strip { id, curve: proposal.curve, cost: proposal.cost, visible: true });
+        let curve = self.model.to_design(&proposal.curve)?;
+        let on_proxy = self.model.proxy.is_some().then_some(proposal.curve);
+        strips.push(Strip { id, curve, on_proxy, cost: proposal.cost, visible: true });
         self.change(strips, progress)?;
         self.next_id += 1;
         Ok(id)
@@ -307,9 +322,37 @@ impl Session {
 
     /// What the surface would look like with `proposal` added; for suggestions.
     pub(super) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
-        let placed = self.design.strips.iter().map(|s| &s.curve);
+        let placed = self.design.strips.iter().map(Strip::woven);
         Arrangement::sketch(&self.model.mesh, placed.chain([curve]))
     }
+}
+
+/// Puts the strips of a design on the proxy of a model, if it has one: as they were woven, or else as they lie on the
+/// mesh. Tells whether they make the same of both meshes.
+fn on_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError> {
+    let Some(proxy) = &model.proxy else {
+        design.proxy = None;
+        design.strips.iter_mut().for_each(|s| s.on_proxy = None);
+        return Ok(true);
+    };
+    let made_on = design.proxy.replace(fingerprint(&model.mesh));
+    let lies = |s: &Strip| s.on_proxy.as_ref().is_some_and(|c| c.check(&model.mesh).is_ok());
+    if made_on == design.proxy && design.strips.iter().all(lies) {
+        return Ok(true);
+    }
+    let original = &model.loaded.mesh;
+    for strip in &mut design.strips {
+        match proxy.curve_to_proxy(original, &strip.curve) {
+            Ok(curve) => strip.on_proxy = Some(curve),
+            Err(error) => {
+                tracing::debug!(%error, strip = strip.id.0, "not on the proxy");
+                return Ok(false);
+            }
+        }
+    }
+    let here = Arrangement::sketch(&model.mesh, design.strips.iter().map(Strip::woven))?;
+    let there = Arrangement::sketch(original, design.strips.iter().map(|s| &s.curve))?;
+    Ok(alike(&here, &there))
 }
 
 /// A found loop, relaxed to a smooth curve that still passes `at`.

@@ -130,9 +130,12 @@ impl Session {
         Ok(if helps { Proposal { curve: relaxed.curve, cost: proposal.cost } } else { proposal })
     }
 
-    /// By how much a curve would reduce the deficit, if it would.
+    /// By how much a curve would reduce the deficit, if it would and can be placed.
     fn gain(&self, curve: &SurfaceCurve, before: f64, goal: Goal) -> Option<f64> {
         let model = self.model();
+        if model.proxy.is_some() && model.to_design(curve).is_err() {
+            return None;
+        }
         let arrangement = self.arranged_with(curve).ok()?;
         let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let gain = before - deficit(&reports, goal);

@@ -4,8 +4,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::embedding::draw_as_woven;
+use super::export::export_drawn;
 use super::*;
 use crate::dual::Colour;
+use crate::embed::Next;
 use crate::layout::LayoutFile;
 use crate::mesh::{LoadedMesh, Normalization, TriMesh, builtin};
 use crate::progress::Progress;
@@ -13,7 +16,7 @@ use crate::testing::{grid, square, torus};
 
 fn loaded(mesh: TriMesh) -> LoadedMesh {
     let units = Normalization { center: DVec3::ZERO, scale: 1.0 };
-    LoadedMesh { mesh, units, repairs: Vec::new(), name: "test".into() }
+    LoadedMesh { mesh: mesh.into(), units, repairs: Vec::new(), name: "test".into() }
 }
 
 fn session(mesh: TriMesh) -> Session {
@@ -213,4 +216,93 @@ fn pins_find_their_parts_again_and_follow_undo() {
     assert_eq!(s.design().pins, pins);
     s.redo(&progress).unwrap();
     assert!(s.design().pins.is_empty());
+}
+
+/// A session on a mesh of which a proxy of `proxy` triangles is made.
+fn proxied(mesh: TriMesh, proxy: u32) -> Session {
+    let source = MeshSource::File("test.obj".into());
+    let options = Options { proxy, ..Options::default() };
+    Session::open(loaded(mesh), source, options, &Progress::new()).unwrap()
+}
+
+#[test]
+fn a_large_mesh_is_woven_on_its_proxy() {
+    let progress = Progress::new();
+    let mut s = proxied(torus(96, 48), 2000);
+    assert_eq!((s.model().mesh.n_faces(), s.model().loaded.mesh.n_faces()), (2000, 9216));
+    for p in [DVec3::new(0.4, 0.0, 0.0), DVec3::new(0.0, 0.4, 0.0)] {
+        let at = s.model().index.nearest(p);
+        let best = s.proposals(at, &progress).unwrap().swap_remove(0);
+        let (mesh, shown) = (&s.model().loaded.mesh, s.model().shown(&best.curve));
+        let passes = shown.iter().map(|q| q.distance(at.position(mesh))).fold(f64::MAX, f64::min);
+        assert!(passes < 0.02, "{passes}");
+        assert!(shown.iter().all(|q| s.model().index.nearest(*q).position(mesh).distance(*q) < 1e-9));
+        s.place(best, &progress).unwrap();
+    }
+    let (design, mesh) = (s.design().clone(), s.model().loaded.mesh.clone());
+    for strip in &design.strips {
+        strip.curve.check(&mesh).unwrap();
+        strip.woven().check(&s.model().mesh).unwrap();
+        assert!((strip.curve.length(&mesh) / strip.woven().length(&s.model().mesh) - 1.0).abs() < 0.05);
+    }
+    // Opened again it is the same to the last bit.
+    let text = serde_json::to_string(&design).unwrap();
+    let again: Design = serde_json::from_str(&text).unwrap();
+    assert_eq!(again, design);
+    let again = Session::resume(loaded(torus(96, 48)), again, &progress).unwrap();
+    assert_eq!(*again.design(), design);
+    assert_eq!(again.woven().arrangement.region_of_face, s.woven().arrangement.region_of_face);
+}
+
+#[test]
+fn a_design_opens_with_and_without_a_proxy() {
+    let progress = Progress::new();
+    let mut s = proxied(torus(96, 48), 2000);
+    assert_eq!(s.weave_to(Goal::Valid, &progress).unwrap(), None);
+    let design = s.design().clone();
+    let curves = |d: &Design| d.strips.iter().map(|s| s.curve.clone()).collect::<Vec<_>>();
+    for proxy in [0, 1500, 3000, 40] {
+        let options = Options { proxy, ..design.options };
+        let other = Session::resume(loaded(torus(96, 48)), Design { options, ..design.clone() }, &progress).unwrap();
+        assert_eq!(curves(other.design()), curves(&design), "{proxy}");
+        assert_eq!(other.design().proxy.is_some(), other.model().proxy.is_some());
+        assert_eq!(other.woven().arrangement.crossings.len(), s.woven().arrangement.crossings.len(), "{proxy}");
+        let drawn = ExportOptions { embedding: None, ..ExportOptions::default() };
+        assert!(export(&other, &drawn, &progress).is_ok(), "{proxy}");
+    }
+    assert_eq!(Session::resume(loaded(torus(96, 48)), design, &progress).unwrap().model().mesh.n_faces(), 2000);
+}
+
+#[test]
+fn without_a_proxy_a_design_says_nothing_of_it() {
+    let mut s = session(torus(32, 16));
+    place(&mut s, DVec3::new(0.4, 0.0, 0.0));
+    let text = serde_json::to_string(s.design()).unwrap();
+    assert!(!text.contains("proxy") && !text.contains("smoothing"), "{text}");
+}
+
+#[test]
+fn a_layout_embedded_on_the_proxy_has_its_quads_on_the_mesh() {
+    let progress = Progress::new();
+    for mesh in [torus(96, 48), grid(64, 64, [false, false], |u, v| DVec3::new(u, v, 0.1 * (6.0 * u).sin() * v))] {
+        let mut s = proxied(mesh, 1500);
+        assert_eq!(s.weave_to(Goal::Valid, &progress).unwrap(), None);
+        let mesh = s.model().loaded.mesh.clone();
+        let far = |e: &Export| {
+            let off = |p: &DVec3| s.model().index.nearest(*p).position(&mesh).distance(*p);
+            e.quads.positions.iter().map(off).fold(0.0, f64::max)
+        };
+        let on_mesh = export(&s, &ExportOptions::default(), &progress).unwrap();
+        assert_eq!(on_mesh.ground, Ground::Design);
+        let drawn = draw_as_woven(&s, &progress).unwrap();
+        assert_eq!(drawn.ground, Ground::Proxy);
+        let mut watch = |_: &_| Next::Continue;
+        let carried = export_drawn(&s, &drawn, None, &ExportOptions::default(), &progress, &mut watch).unwrap();
+        let count = |e: &Export| (e.layout.patches.len(), e.layout.nodes.len(), e.layout.n_irregular());
+        assert_eq!(count(&on_mesh), count(&carried));
+        assert!(far(&on_mesh) < 1e-9 && far(&carried) < 1e-9, "{} {}", far(&on_mesh), far(&carried));
+        for (e, name) in [(on_mesh, "mesh"), (carried, "proxy")] {
+            assert_eq!(crate::quad::quality(&e.quads).0, 0, "folded on the {name}");
+        }
+    }
 }

@@ -41,7 +41,7 @@ impl Woven {
     /// A strip that does not lie on the mesh, or [`WeaveError::Cancelled`].
     pub fn new(model: &Model, strips: &[Strip], progress: &Progress) -> Result<Self, WeaveError> {
         progress.report("Arranging strips", 0.0);
-        let arrangement = Arrangement::new(&model.mesh, strips.iter().map(|s| &s.curve))?;
+        let arrangement = Arrangement::new(&model.mesh, strips.iter().map(Strip::woven))?;
         let mesh = arrangement.refined.to_mesh().map_err(ArrangementError::from)?;
         progress.check()?;
         progress.report("Assessing regions", 0.1);
@@ -74,7 +74,7 @@ impl Woven {
 
 /// Closes the directions along a strip's spine in the triangles it passes.
 fn close_along(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
-    let (mesh, curve) = (&model.mesh, &strip.curve);
+    let (mesh, curve) = (&model.mesh, strip.woven());
     let n = curve.crossings.len();
     for i in usize::from(!curve.closed)..n {
         let Some(face) = curve.face_before(mesh, i) else { continue };

@@ -132,13 +132,14 @@ impl Figures {
 
 /// What the window does, at random points and along strokes.
 fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
-    let mesh = session.model().mesh.clone();
-    let metric = Metric::new(&mesh);
-    let mut points = Points::new(&mesh, arguments.seed);
+    let model = session.model().clone();
+    let mesh = &model.loaded.mesh;
+    let metric = Metric::new(mesh);
+    let mut points = Points::new(mesh, arguments.seed);
     let apart: Vec<SurfacePoint> = (0..arguments.points).map(|_| points.point()).collect();
     let strokes = arguments.points.div_ceil(STROKE);
     let moving: Vec<SurfacePoint> =
-        (0..strokes).flat_map(|_| points.stroke(&mesh, &metric, STROKE, STEP)).take(arguments.points).collect();
+        (0..strokes).flat_map(|_| points.stroke(mesh, &metric, STROKE, STEP)).take(arguments.points).collect();
     for (name, list) in [("pointer", apart), ("moving pointer", moving)] {
         let (mut shown, mut proved, mut all) = (Vec::new(), Vec::new(), Vec::new());
         let progress = Progress::new();
@@ -146,7 +147,8 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
         for at in list {
             let now = Instant::now();
             let (mut first, mut best) = (None, None);
-            session.proposals_with(at, &progress, |_| {
+            session.proposals_with(at, &progress, |proposal| {
+                drop(model.shown(&proposal.curve));
                 best = Some(now.elapsed());
                 first = first.or(best);
             })?;

@@ -27,7 +27,8 @@ impl Input {
         }
         let mut crease = sharp_edges(&loaded.mesh, SHARP_DIHEDRAL);
         for _ in 0..levels {
-            (loaded.mesh, crease) = subdivided(&loaded.mesh, &crease)?;
+            let (mesh, finer) = subdivided(&loaded.mesh, &crease)?;
+            (loaded.mesh, crease) = (mesh.into(), finer);
         }
         let mut obj = Vec::new();
         write_mesh_obj(&mut obj, &loaded.mesh, &loaded.units)?;

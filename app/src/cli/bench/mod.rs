@@ -25,6 +25,8 @@ use clap::{Args, Subcommand};
 use plait_core::progress::Progress;
 use plait_core::weave::{Options, Session};
 
+use super::DetailArguments;
+
 use input::Input;
 use report::Report;
 
@@ -88,6 +90,9 @@ pub struct RunArguments {
     /// Leave out the yardsticks.
     #[arg(long)]
     no_reference: bool,
+    /// How much of the shape strips follow.
+    #[command(flatten)]
+    detail: DetailArguments,
     /// Write JSON.
     #[arg(long)]
     json: bool,
@@ -174,7 +179,8 @@ fn measured(arguments: &RunArguments, parts: Parts) -> anyhow::Result<Report> {
         open::measure(&input, arguments, &mut report)?;
     }
     let loaded = input.load(&progress)?;
-    let session = || Session::open(loaded.clone(), input.source(), Options::default(), &progress);
+    let options = arguments.detail.over(Options::default());
+    let session = || Session::open(loaded.clone(), input.source(), options, &progress);
     let mut woven = session()?;
     report.describe(woven.model(), arguments.subdivide);
     if parts.hover {

@@ -17,7 +17,7 @@ pub(super) fn measure(input: &Input, arguments: &RunArguments, report: &mut Repo
     for _ in 0..arguments.repeats {
         let model = staged.time(|progress| -> anyhow::Result<Model> {
             let loaded = input.load(progress)?;
-            Ok(Model::prepare(loaded, Options::default(), progress)?)
+            Ok(Model::prepare(loaded, arguments.detail.over(Options::default()), progress)?)
         })?;
         drop(model);
         if staged.spent() > arguments.limit() {

@@ -36,6 +36,9 @@ pub(super) struct MeshFacts {
     pub(super) boundary_loops: usize,
     /// How often its triangles were cut in four.
     pub(super) subdivided: u32,
+    /// Triangles of the proxy that is woven on, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) proxy: Option<usize>,
 }
 
 /// The search graph.
@@ -91,11 +94,12 @@ impl Report {
     pub(super) fn describe(&mut self, model: &Model, subdivided: u32) {
         self.mesh = MeshFacts {
             name: model.loaded.name.clone(),
-            vertices: model.mesh.n_vertices(),
-            triangles: model.mesh.n_faces(),
+            vertices: model.loaded.mesh.n_vertices(),
+            triangles: model.loaded.mesh.n_faces(),
             genus: model.topology.genus,
             boundary_loops: model.topology.boundary_loops.len(),
             subdivided,
+            proxy: model.proxy.as_ref().map(|p| p.mesh().n_faces()),
         };
         let graph = &model.graph;
         self.graph = GraphFacts { states: graph.n_states(), steps: graph.n_steps(), bytes: graph.bytes() };

@@ -24,7 +24,7 @@ pub(super) struct Placements {
 impl Placements {
     /// The placements of a seed; their points are others than those at which proposals are timed.
     pub(super) fn new(session: &Session, seed: u64) -> Self {
-        Self { points: Points::new(&session.model().mesh, !seed) }
+        Self { points: Points::new(&session.model().loaded.mesh, !seed) }
     }
 
     /// Has `place` place the next strip; tells whether there was one.

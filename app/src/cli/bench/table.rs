@@ -11,12 +11,13 @@ use super::{embed, open, reference, strips};
 pub(super) fn text(report: &Report) -> String {
     let (mesh, graph) = (&report.mesh, &report.graph);
     let mut text = format!(
-        "{}: {} triangles, {} vertices, genus {}, boundary loops {}\nsearch graph: {} states, {} steps, {}\n{}\nseed {}",
+        "{}: {} triangles, {} vertices, genus {}, boundary loops {}{}\nsearch graph: {} states, {} steps, {}\n{}\nseed {}",
         mesh.name,
         mesh.triangles,
         mesh.vertices,
         mesh.genus,
         mesh.boundary_loops,
+        mesh.proxy.map(|n| format!(", woven on a proxy of {n} triangles")).unwrap_or_default(),
         graph.states,
         graph.steps,
         megabytes(Some(graph.bytes as u64)),
@@ -69,7 +70,8 @@ pub(super) fn markdown(reports: &[Report]) -> String {
         let mesh = &report.mesh;
         let levels = if mesh.subdivided > 0 { format!(", subdivided {}×", mesh.subdivided) } else { String::new() };
         let (name, memory) = (format!("{}{levels}", mesh.name), megabytes(report.peak_memory));
-        let _ = writeln!(text, "| {name} | {} | {} | {memory} |", mesh.triangles, cells.join(" | "));
+        let proxy = mesh.proxy.map(|n| format!(" (proxy {n})")).unwrap_or_default();
+        let _ = writeln!(text, "| {name} | {}{proxy} | {} | {memory} |", mesh.triangles, cells.join(" | "));
     }
     text
 }

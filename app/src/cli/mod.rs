@@ -152,7 +152,7 @@ pub struct EmbedArguments {
     /// What may change for the sake of the quads.
     #[command(flatten)]
     pub refine: RefineArguments,
-    /// Most steps of the nodes.
+    /// Most steps of the nodes in each of the two phases.
     #[arg(long)]
     pub steps: Option<usize>,
     /// Keep lengths even over the surface.

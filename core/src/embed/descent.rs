@@ -65,7 +65,7 @@ pub struct Surface<'a> {
 /// How an embedding is optimised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Steps of the nodes at most.
+    /// Steps of the nodes at most: with least squares, and as many again without folds.
     pub steps: usize,
     /// Halvings of the step at most.
     pub halvings: usize,

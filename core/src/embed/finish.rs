@@ -61,7 +61,8 @@ impl Optimizer<'_> {
         objective.stiffness.clear();
         let quarters = net.quarters();
         let at = (&solution.free[..], &quarters[..]);
-        let unfolded = system.unfold(&net.mesh, metric, field, objective, at, Effort::Thorough, progress)?;
+        let triangles = system.triangles(&net.mesh, metric, field, objective)?;
+        let unfolded = system.unfold(&triangles, at, Effort::Thorough, progress)?;
         tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "folds removed");
         solution.map = system.map(&unfolded.y);
         solution.energy = unfolded.energy;

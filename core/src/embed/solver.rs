@@ -258,8 +258,8 @@ impl Setting<'_> {
         let folds = energy.folds(&system.map(&free).uv);
         if found.is_none() && folds <= FEW {
             let quarters = net.quarters();
-            let (mesh, at) = (&net.mesh, (&free[..], &quarters[..]));
-            let unfolded = system.unfold(mesh, metric, field, objective, at, Effort::Quick, progress)?;
+            let triangles = system.triangles(&net.mesh, metric, field, objective)?;
+            let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
             tracing::debug!(folds, left = unfolded.folds.len(), "folds of the first guess");
             found = system.injective(&energy, unfolded.y);
         }

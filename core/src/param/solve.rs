@@ -252,24 +252,20 @@ impl SeamlessSystem {
         Ok(Solution { map, free, energy })
     }
 
-    /// Removes the folds of the map with free variables `y`; see [`unfold`](super::unfold). `quarters` tells the angle
-    /// around every vertex in the map, in quarter turns; 0 where it is open, as on the boundary.
+    /// The triangles of the map as [`Self::unfold`] wants them.
     ///
     /// # Errors
     ///
-    /// [`ParamError::WrongLength`] or [`ParamError::Cancelled`].
-    pub fn unfold(
+    /// [`ParamError::WrongLength`] for arrays of another mesh.
+    pub fn triangles(
         &self,
         mesh: &TriMesh,
         metric: &Metric,
         field: &CrossField,
         objective: &Objective,
-        (y, quarters): (&[f64], &[u32]),
-        effort: Effort,
-        progress: &Progress,
-    ) -> Result<Unfolded, ParamError> {
-        expect_length("the list of angles around vertices", quarters.len(), mesh.n_vertices())?;
-        expect_length("the list of free variables", y.len(), self.n_free())?;
+    ) -> Result<Vec<OrientedTriangle>, ParamError> {
+        expect_length("the mesh", mesh.n_faces(), self.cut.turn.len())?;
+        expect_length("the field", field.angle.len(), mesh.n_faces())?;
         let triangle = |f: FaceId| {
             let [a, b] = objective.target(f);
             OrientedTriangle {
@@ -282,8 +278,25 @@ impl SeamlessSystem {
                 corners: mesh.face_halfedges(f).map(|h| [0, 1].map(|axis| constraints::corner(&self.cut, h, axis))),
             }
         };
-        let triangles: Vec<OrientedTriangle> = mesh.faces().map(triangle).collect();
-        let problem = OrientationProblem { triangles: &triangles, reduction: &self.tied.reduction, quarters };
+        Ok(mesh.faces().map(triangle).collect())
+    }
+
+    /// Removes the folds of the map with free variables `y`; see [`unfold`](super::unfold). `quarters` tells the angle
+    /// around every vertex in the map, in quarter turns; 0 where it is open, as on the boundary.
+    ///
+    /// # Errors
+    ///
+    /// [`ParamError::WrongLength`] or [`ParamError::Cancelled`].
+    pub fn unfold(
+        &self,
+        triangles: &[OrientedTriangle],
+        (y, quarters): (&[f64], &[u32]),
+        effort: Effort,
+        progress: &Progress,
+    ) -> Result<Unfolded, ParamError> {
+        expect_length("the list of triangles", triangles.len(), self.cut.turn.len())?;
+        expect_length("the list of free variables", y.len(), self.n_free())?;
+        let problem = OrientationProblem { triangles, reduction: &self.tied.reduction, quarters };
         Ok(unfold(&problem, y, effort, progress)?)
     }
 

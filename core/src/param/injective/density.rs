@@ -109,9 +109,9 @@ fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
     for row in a.iter_mut() {
         (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
     }
-    for k in 0..4 {
-        (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-    }
+    let rows = (a[p], a[q]);
+    a[p] = std::array::from_fn(|k| c * rows.0[k] - s * rows.1[k]);
+    a[q] = std::array::from_fn(|k| s * rows.0[k] + c * rows.1[k]);
     for row in v.iter_mut() {
         (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
     }
@@ -143,17 +143,16 @@ mod tests {
         // At the best matrix conceivable nothing is cut off.
         let at = [2f64.sqrt(), 0.0, 0.0, 2f64.sqrt()];
         let (_, hessian) = DENSITY.derivatives(&at);
-        for r in 0..4 {
-            for c in 0..4 {
-                let moved = |d: f64| {
-                    let mut j = at;
-                    j[c] += d;
-                    let det = j[0] * j[3] - j[1] * j[2];
-                    assert!(det > 0.0);
-                    DENSITY.derivatives(&j).0[r]
-                };
-                let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-                assert!((slope - hessian[r][c]).abs() < 1e-8, "{r} {c}: {slope} {}", hessian[r][c]);
+        for c in 0..4 {
+            let moved = |d: f64| {
+                let mut j = at;
+                j[c] += d;
+                DENSITY.derivatives(&j).0
+            };
+            let (up, down) = (moved(1e-5), moved(-1e-5));
+            for (r, row) in hessian.iter().enumerate() {
+                let slope = (up[r] - down[r]) / 2e-5;
+                assert!((slope - row[c]).abs() < 1e-8, "{r} {c}: {slope} {}", row[c]);
             }
         }
     }

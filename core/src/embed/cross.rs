@@ -48,10 +48,11 @@ pub(super) fn step_to_crossing(
     let [u, v] = map.gradients(metric, mesh.face(corner));
     let area = u.perp_dot(v);
     // Where the map is folded or flat its gradients tell nothing.
-    (area > FLAT).then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
+    (area > FLAT * 0.5 * (u.length_squared() + v.length_squared()))
+        .then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
 }
 
-/// Area of the image of a unit area below which the map is too flat to follow: wanted is 1.
+/// How much less area than a square of its size a map's image may have before it is too flat to follow.
 const FLAT: f64 = 0.05;
 
 fn at(map: &SeamlessMap, corner: HalfedgeId) -> DVec2 {

@@ -441,11 +441,16 @@ impl<'a> Optimizer<'a> {
         next
     }
 
-    /// The triangles around nodes that are at another vertex in `net` than before, and around those vertices.
+    /// The triangles around nodes that are at another vertex in `net` than before, and around those vertices. Nodes that
+    /// are not held move through the map, not with it: around these it is enough that they have moved at all.
     fn turned(&self, net: &Net) -> Vec<bool> {
         let mesh = &net.mesh;
         let mut near = vec![false; mesh.n_vertices()];
-        for (old, new) in self.state.net.nodes.iter().zip(&net.nodes).filter(|(old, new)| old.vertex != new.vertex) {
+        for ((old, new), held) in self.state.net.nodes.iter().zip(&net.nodes).zip(&self.roads.held) {
+            let stays = self.state.net.mesh.position(old.vertex) == net.mesh.position(new.vertex);
+            if old.vertex == new.vertex && (stays || *held) {
+                continue;
+            }
             for v in [old.vertex, new.vertex] {
                 near[v.index()] = true;
             }

@@ -15,8 +15,8 @@ use crate::surface::{SurfaceIndex, straightest};
 
 /// How often a step that is not possible is halved before the node stays.
 const HALVINGS: usize = 4;
-/// Least sine of the angles of triangles around a node, relative to what they were: below, the map's gradients there
-/// mean little.
+/// Doubled area over squared longest side below which triangles around a node may not become thinner than by half: the
+/// map's gradients there mean little.
 const THIN: f64 = 0.02;
 /// Least cosine between normals of triangles before and after.
 const TILT: f64 = 0.2;
@@ -94,7 +94,7 @@ impl Ground<'_> {
         for to in corners {
             let Some(path) = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v)) else { continue };
             let old = net.mesh.position(from);
-            let before = self.normals(&net.mesh, from, to);
+            let before = self.at_rest(&net.mesh, from, to);
             net.mesh.set_position(from, self.home[from.index()]);
             net.mesh.set_position(to, place);
             if sound(&net.mesh, &before) {
@@ -109,8 +109,8 @@ impl Ground<'_> {
         false
     }
 
-    /// The normals of the triangles around two vertices when no node is there.
-    fn normals(&self, mesh: &TriMesh, a: VertexId, b: VertexId) -> Vec<(FaceId, DVec3)> {
+    /// The triangles around two vertices as they are when no node is there.
+    fn at_rest(&self, mesh: &TriMesh, a: VertexId, b: VertexId) -> Vec<AtRest> {
         let mut faces: Vec<FaceId> = [a, b].iter().flat_map(|&v| mesh.outgoing(v).map(|h| mesh.face(h))).collect();
         faces.sort_unstable();
         faces.dedup();
@@ -118,8 +118,8 @@ impl Ground<'_> {
         faces
             .into_iter()
             .map(|f| {
-                let [p, q, r] = mesh.face_vertices(f).map(at);
-                (f, (q - p).cross(r - p).normalize_or_zero())
+                let (area, longest) = spread(mesh.face_vertices(f).map(at));
+                AtRest { face: f, normal: area.normalize_or_zero(), width: area.length() / longest }
             })
             .collect()
     }
@@ -173,7 +173,7 @@ impl Ground<'_> {
             to = if net.mesh.origin(h) == to { net.mesh.target(h) } else { net.mesh.origin(h) };
         }
         let old = net.mesh.position(from);
-        let before = self.normals(&net.mesh, from, to);
+        let before = self.at_rest(&net.mesh, from, to);
         net.mesh.set_position(from, self.home[from.index()]);
         net.mesh.set_position(to, place);
         if sound(&net.mesh, &before) {
@@ -249,13 +249,26 @@ fn edge_path(
     Some(path)
 }
 
-/// Whether the triangles given with their former normals are neither turned over nor squashed.
-fn sound(mesh: &TriMesh, before: &[(FaceId, DVec3)]) -> bool {
-    before.iter().all(|&(f, normal)| {
-        let [a, b, c] = mesh.face_vertices(f).map(|v| mesh.position(v));
-        let area = (b - a).cross(c - a);
-        let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+/// A triangle when no node is at its corners.
+struct AtRest {
+    face: FaceId,
+    normal: DVec3,
+    /// Its doubled area over the square of its longest side.
+    width: f64,
+}
+
+/// Whether triangles are neither turned over nor squashed against what they were.
+fn sound(mesh: &TriMesh, before: &[AtRest]) -> bool {
+    before.iter().all(|&AtRest { face, normal, width }| {
+        let (area, longest) = spread(mesh.face_vertices(face).map(|v| mesh.position(v)));
+        let upright = area.dot(normal) > TILT * area.length();
         // A triangle that was degenerate before says nothing.
-        normal == DVec3::ZERO || (area.dot(normal) > TILT * area.length() && area.length() > THIN * longest)
+        normal == DVec3::ZERO || (upright && area.length() > THIN.min(0.5 * width) * longest)
     })
+}
+
+/// The normal of a triangle, as long as its doubled area, and the square of its longest side.
+fn spread([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
+    let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+    ((b - a).cross(c - a), longest)
 }

@@ -6,6 +6,7 @@
 use super::descent::Optimizer;
 use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Snapshot};
 use super::measures::measure_patches;
+use super::solver::Folded;
 use super::state::State;
 use super::trace::{Folds, trace_arcs};
 use super::{EmbeddingError, emerge, map_rectangles};
@@ -130,10 +131,10 @@ impl<'w> Course<'w> {
     pub(super) fn without_folds(
         &mut self,
         job: &Job<'_>,
-        start: Result<Option<Optimizer<'_>>, EmbeddingError>,
+        start: Result<Result<Optimizer<'_>, Folded>, EmbeddingError>,
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
-        let mut optimizer = start?.ok_or(EmbeddingError::Folded)?;
+        let mut optimizer = start?.map_err(|_| EmbeddingError::Folded)?;
         self.show(&optimizer);
         let safe = optimizer.state().clone();
         optimizer.release(job);

@@ -15,7 +15,7 @@ use super::net::Net;
 use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
 use super::snap::snap;
-use super::solver::{Aim, Features, Solver, Start};
+use super::solver::{Aim, Features, Folded, Solver, Start};
 use super::spacing::{Spacing, lengths};
 use super::state::State;
 use super::straight::{ArcEnd, Crossroads};
@@ -154,7 +154,7 @@ impl<'a> Optimizer<'a> {
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
         Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, Features::Held), progress)?
-            .ok_or(EmbeddingError::Folded)
+            .map_err(|_| EmbeddingError::Folded)
     }
 
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
@@ -163,7 +163,7 @@ impl<'a> Optimizer<'a> {
         (net, sharp, curvature): (Net, Vec<bool>, Vec<PrincipalCurvature>),
         (aim, features): (Aim<'_>, Features),
         progress: &Progress,
-    ) -> Result<Option<Self>, EmbeddingError> {
+    ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let Job { surface, layout, settings, .. } = *job;
         let held = pinned(job);
         let mut roads = Crossroads::new(layout, |i| held[i]);
@@ -195,9 +195,12 @@ impl<'a> Optimizer<'a> {
             settings,
             features,
         };
-        let Some(state) = solver.solve(net, metric, None, aim, progress)? else { return Ok(None) };
+        let state = match solver.solve(net, metric, None, aim, progress)? {
+            Ok(state) => state,
+            Err(folded) => return Ok(Err(folded)),
+        };
         let (seamless, sizes) = (solver.seamless, solver.sizes);
-        Ok(Some(Self {
+        Ok(Ok(Self {
             ground,
             settings,
             curvature,
@@ -284,8 +287,7 @@ impl<'a> Optimizer<'a> {
             tracing::debug!(held, "chords held apart");
             self.state = self.solve(self.state.net.clone(), progress)?;
         }
-        let net = self.moved();
-        let next = self.attempt(net, progress)?.filter(|next| next.solution.energy < self.state.solution.energy);
+        let next = self.next(progress)?.filter(|next| next.solution.energy < self.state.solution.energy);
         let better = next.is_some();
         tracing::debug!(step = self.steps, energy = next.as_ref().map(|n| n.solution.energy), "nodes moved");
         if let Some(next) = next {
@@ -299,6 +301,43 @@ impl<'a> Optimizer<'a> {
             self.halved += 1;
         }
         Ok(better)
+    }
+
+    /// Field and map with all nodes moved that can without folding the map; `None` if too few can.
+    fn next(&mut self, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
+        let (next, stays) = self.as_far_as_possible(Self::moved, progress)?;
+        for (pace, _) in self.pace.iter_mut().zip(stays).filter(|(_, stays)| *stays) {
+            *pace *= 0.5;
+        }
+        Ok(next)
+    }
+
+    /// Field and map of a net with nodes moved, of which those stay in whose cells the map would fold: the net is asked
+    /// for with the cells and for each node whether it stays. `None` if too few can move.
+    pub(super) fn as_far_as_possible(
+        &mut self,
+        moved: impl Fn(&Self, &[u32], &[bool]) -> Net,
+        progress: &Progress,
+    ) -> Result<(Option<State>, Vec<bool>), EmbeddingError> {
+        let cell = self.cells();
+        let mut stays = vec![false; self.pace.len()];
+        loop {
+            let net = moved(self, &cell, &stays);
+            let folded = match self.attempt(net, progress)? {
+                Ok(next) => return Ok((Some(next), stays)),
+                Err(Folded(list)) => list,
+            };
+            let count = |stays: &[bool]| stays.iter().filter(|&&s| s).count();
+            let before = count(&stays);
+            for v in folded.iter().flat_map(|&f| self.state.net.mesh.face_vertices(f)) {
+                stays.get_mut(cell[v.index()] as usize).into_iter().for_each(|s| *s = true);
+            }
+            let after = count(&stays);
+            if after == before || 2 * after > stays.len() {
+                return Ok((None, stays));
+            }
+            tracing::debug!(nodes = after, "nodes stay where the map would fold");
+        }
     }
 
     /// Lengthens the steps of nodes that keep their direction and shortens those of nodes that turn back.
@@ -341,18 +380,17 @@ impl<'a> Optimizer<'a> {
         }
     }
 
-    /// The net with every node moved by one step.
-    fn moved(&self) -> Net {
+    /// The net with every node moved by one step but for those that stay.
+    fn moved(&self, cell: &[u32], stays: &[bool]) -> Net {
         let State { net, metric, .. } = &self.state;
         let mut moved = net.clone();
-        let cell = self.cells();
         for (i, node) in net.nodes.iter().enumerate() {
             let v = node.vertex;
-            if self.ground.hold[i] == Hold::Fixed {
+            if self.ground.hold[i] == Hold::Fixed || stays[i] {
                 continue;
             }
             if !self.roads.held[i] {
-                self.cross(&mut moved, i, &cell);
+                self.cross(&mut moved, i, cell);
                 continue;
             }
             let step = self.downhill(v) * (STEP * self.pace[i]);
@@ -362,7 +400,7 @@ impl<'a> Optimizer<'a> {
             match self.ground.hold[i] {
                 Hold::Free => {
                     // The polar map is that of the mesh before any node moved: close by nothing else changes.
-                    self.ground.glide(&mut moved, metric, i, step, &cell);
+                    self.ground.glide(&mut moved, metric, i, step, cell);
                 }
                 Hold::Curve => {
                     let along = self.in_space(&net.mesh, metric, v, step);
@@ -411,11 +449,11 @@ impl<'a> Optimizer<'a> {
     ///
     /// See [`EmbeddingError`]; [`EmbeddingError::Folded`] if there is to be a map without folds and none was found.
     pub(super) fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
-        self.attempt(net, progress)?.ok_or(EmbeddingError::Folded)
+        self.attempt(net, progress)?.map_err(|_| EmbeddingError::Folded)
     }
 
-    /// As [`Self::solve`], `None` where no map without folds was found.
-    pub(super) fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
+    /// As [`Self::solve`], [`Folded`] where no map without folds was found.
+    pub(super) fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Result<State, Folded>, EmbeddingError> {
         let metric = Metric::new(&net.mesh);
         let State { metric: before, field, solution, .. } = &self.state;
         let uv = &solution.map.uv;
@@ -467,14 +505,11 @@ impl<'a> Optimizer<'a> {
         turned
     }
 
-    /// The net with regular nodes, and only these, brought to the crossings of their isolines.
-    pub(super) fn settled(&self) -> Net {
+    /// The net with regular nodes, and only these, brought to the crossings of their isolines but for those that stay.
+    pub(super) fn settled(&self, cell: &[u32], stays: &[bool]) -> Net {
         let mut moved = self.state.net.clone();
-        let cell = self.cells();
-        for i in 0..moved.nodes.len() {
-            if !self.roads.held[i] {
-                self.cross(&mut moved, i, &cell);
-            }
+        for i in (0..moved.nodes.len()).filter(|&i| !stays[i] && !self.roads.held[i]) {
+            self.cross(&mut moved, i, cell);
         }
         moved
     }

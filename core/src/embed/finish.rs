@@ -29,8 +29,10 @@ impl Optimizer<'_> {
     /// See [`EmbeddingError`].
     pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
         for _ in 0..SETTLING {
-            let net = self.settled();
-            self.state = self.solve(net, progress)?;
+            match self.as_far_as_possible(Self::settled, progress)? {
+                (Some(state), _) => self.state = state,
+                (None, _) => break,
+            }
         }
         if self.shape.is_none() {
             self.refine(progress)?;
@@ -77,8 +79,8 @@ impl Optimizer<'_> {
         }
         self.features = Features::Held;
         match self.attempt(self.state.net.clone(), progress)? {
-            Some(state) => self.state = state,
-            None => tracing::debug!("features are not isolines exactly"),
+            Ok(state) => self.state = state,
+            Err(_) => tracing::debug!("features are not isolines exactly"),
         }
         Ok(())
     }
@@ -113,7 +115,7 @@ impl Optimizer<'_> {
             if least == 0 {
                 break;
             }
-            raise(&work.net.mesh, &work.folded(), &mut weight);
+            raise(&work.net.mesh, &work.folded(), STIFFER, &mut weight);
             work.objective.stiffness = weight.clone();
             work.solution = system.solve(&work.metric, &work.field, &work.objective, progress)?;
             let now = work.flipped();
@@ -129,7 +131,7 @@ impl Optimizer<'_> {
 }
 
 /// Raises the weights of folded triangles, less in the rings around them.
-fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
+pub(super) fn raise(mesh: &TriMesh, folded: &[bool], by: f64, weight: &mut [f64]) {
     let mut share: Vec<f64> = folded.iter().map(|&f| if f { 1.0 } else { 0.0 }).collect();
     for _ in 0..FADING {
         let wider = |f: crate::mesh::FaceId| {
@@ -140,6 +142,6 @@ fn raise(mesh: &TriMesh, folded: &[bool], weight: &mut [f64]) {
         share = mesh.faces().map(wider).collect();
     }
     for (w, s) in weight.iter_mut().zip(share) {
-        *w = (*w * (1.0 + STIFFER * s)).min(STIFFEST);
+        *w = (*w * (1.0 + by * s)).min(STIFFEST);
     }
 }

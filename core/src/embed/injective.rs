@@ -10,7 +10,7 @@ use super::EmbeddingError;
 use super::descent::{Optimizer, Surface};
 use super::job::Job;
 use super::net::Net;
-use super::solver::{Aim, Features, Start};
+use super::solver::{Aim, Features, Folded, Start};
 use super::state::State;
 use crate::dual::{Mark, RefinedMesh};
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
@@ -77,12 +77,12 @@ const SIZE: f64 = 0.05;
 const STEPS: usize = 60;
 
 impl<'a> Optimizer<'a> {
-    /// Sets up an optimisation without folds that starts from the drawing. `None` if that folds itself.
+    /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Option<Self>, EmbeddingError> {
+    pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Result<Self, Folded>, EmbeddingError> {
         let drawn = Drawn::new(job.layout, job.drawing, progress)?;
         let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
         for f in &mut net.base_face {
@@ -93,7 +93,7 @@ impl<'a> Optimizer<'a> {
         Self::on(job, (net, sharp, curvature), (aim, Features::Pulled), progress)
     }
 
-    /// Sets up an optimisation without folds that starts from where another has ended. `None` if that map folds.
+    /// Sets up an optimisation without folds that starts from where another has ended. [`Folded`] if that map folds.
     ///
     /// # Errors
     ///
@@ -102,7 +102,7 @@ impl<'a> Optimizer<'a> {
         job: &Job<'a>,
         (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
         progress: &Progress,
-    ) -> Result<Option<Self>, EmbeddingError> {
+    ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
         Self::on(job, (state.net, sharp, curvature), (aim, Features::Held), progress)
     }

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 
 use super::descent::Settings;
+use super::finish::raise;
 use super::guides::{feature_guides, shape_guides};
 use super::net::Net;
 use super::sizing::{SizingSystem, rest_turns};
@@ -15,7 +16,8 @@ use super::{EmbeddingError, alignment};
 use crate::field::{self, CrossField, GuidedSystem, Metric};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{
-    Effort, Injective, InjectiveEnergy, Objective, ParamError, Relation, SeamlessSystem, Shape, Solution, gradients,
+    Effort, Injective, InjectiveEnergy, Objective, ParamError, Relation, SeamlessSystem, Shape, Solution, folds,
+    gradients,
 };
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
@@ -74,7 +76,14 @@ pub(super) enum Start<'s> {
 }
 
 /// Up to how many folds of the first guess of a map are worth removing one by one.
-const FEW: usize = 200;
+const FEW: usize = 50;
+/// How often a first guess is fitted again with more weight on the triangles that fold, and by how much more.
+const REFITS: usize = 2;
+const FIRMER: f64 = 9.0;
+
+/// The triangles that fold in the first guess of a map that is to have none; not empty.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Folded(pub Vec<FaceId>);
 
 /// What field and map are solved with.
 pub(super) struct Solver<'s> {
@@ -91,8 +100,8 @@ pub(super) struct Solver<'s> {
 }
 
 impl Solver<'_> {
-    /// Solves for field and map of a net; with the angles of a field before, guides follow those. `None` if there is to be
-    /// a map without folds and none was found.
+    /// Solves for field and map of a net; with the angles of a field before, guides follow those. [`Folded`] if there is
+    /// to be a map without folds and none was found.
     pub(super) fn solve(
         &mut self,
         net: Net,
@@ -100,7 +109,7 @@ impl Solver<'_> {
         previous: Option<&[f64]>,
         aim: Aim<'_>,
         progress: &Progress,
-    ) -> Result<Option<State>, EmbeddingError> {
+    ) -> Result<Result<State, Folded>, EmbeddingError> {
         let mesh = &net.mesh;
         let angle = self.angles(&net, &metric, previous, progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
@@ -120,7 +129,7 @@ impl Solver<'_> {
         let system = self.build(&net, &field, &nodes, &features)?;
         progress.check()?;
         let solution = match aim {
-            Aim::LeastSquares => Some(system.solve(&metric, &field, &objective, progress)?),
+            Aim::LeastSquares => Ok(system.solve(&metric, &field, &objective, progress)?),
             Aim::Injective { shape, start, steps } => {
                 let firmness = &firmness;
                 let setting =
@@ -239,7 +248,7 @@ impl Setting<'_> {
         start: Start<'_>,
         steps: usize,
         progress: &Progress,
-    ) -> Result<Option<Solution>, EmbeddingError> {
+    ) -> Result<Result<Solution, Folded>, EmbeddingError> {
         let Self { net, metric, field, objective, firmness, pulled } = *self;
         let wanted = match start {
             Start::Map(uv) => gradients(metric, &field.angle, uv),
@@ -251,25 +260,41 @@ impl Setting<'_> {
                 list
             }
         };
-        let free = system.fit(metric, &field.angle, &wanted)?;
-        progress.check()?;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
+        let mut free = system.fit(metric, &field.angle, &wanted, &[])?;
+        let mut folded = folds(&system.map(&free).uv);
+        let mut weight = vec![1.0; wanted.len()];
+        for _ in 0..REFITS {
+            if folded.is_empty() || folded.len() > FEW {
+                break;
+            }
+            progress.check()?;
+            let mut list = vec![false; wanted.len()];
+            folded.iter().for_each(|f| list[f.index()] = true);
+            raise(&net.mesh, &list, FIRMER, &mut weight);
+            free = system.fit(metric, &field.angle, &wanted, &weight)?;
+            let left = folds(&system.map(&free).uv);
+            tracing::debug!(folds = folded.len(), left = left.len(), "fitted again");
+            if left.len() >= folded.len() {
+                break;
+            }
+            folded = left;
+        }
         let mut found = system.injective(&energy, free.clone());
-        let folds = energy.folds(&system.map(&free).uv);
-        if found.is_none() && folds <= FEW {
+        if found.is_none() && folded.len() <= FEW {
             let quarters = net.quarters();
             let triangles = system.triangles(&net.mesh, metric, field, objective)?;
             let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
-            tracing::debug!(folds, left = unfolded.folds.len(), "folds of the first guess");
+            tracing::debug!(folds = folded.len(), left = unfolded.folds.len(), "folds of the first guess");
             found = system.injective(&energy, unfolded.y);
         }
         let Some(mut at) = found else {
-            tracing::debug!(folds, "the first guess folds");
-            return Ok(None);
+            tracing::debug!(folds = folded.len(), "the first guess folds");
+            return Ok(Err(Folded(folded)));
         };
         system.descend(&system.newton()?, &energy, &mut at, steps, progress)?;
         let Injective { map, free, energy } = at;
-        Ok(Some(Solution { map, free, energy }))
+        Ok(Ok(Solution { map, free, energy }))
     }
 }
 

@@ -18,7 +18,7 @@ use thiserror::Error;
 
 pub use cut::{Cut, CutPath};
 pub(crate) use injective::Density;
-pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, gradients};
+pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, folds, gradients};
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{Relation, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};

@@ -42,6 +42,8 @@ const PATIENCE: usize = 2;
 /// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
 /// much as twice the area of the triangles beside it.
 const PULL: f64 = 100.0;
+/// Area of images, where 1 is usual, below and above whose inverse differences are not weighed by it.
+const LEAST_SIZE: f64 = 1e-4;
 /// By what share the diagonal is raised: a semidefinite Hessian must become definite beyond rounding.
 const GROUND: f64 = 1e-9;
 
@@ -89,17 +91,27 @@ struct Derivatives {
 
 impl SeamlessSystem {
     /// The free variables of the map whose gradients in the frame of the field, `∇u` and `∇v` of each triangle, come
-    /// nearest to those given: exactly these if they are those of a map that satisfies all relations.
+    /// nearest to those given: exactly these if they are those of a map that satisfies all relations. Differences count
+    /// in proportion to the size of a triangle's image, so that small images do not fold for the sake of large ones, and to the weights given; none: all 1.
     ///
     /// # Errors
     ///
     /// [`ParamError::WrongLength`] or [`ParamError::Solve`].
-    pub fn fit(&mut self, metric: &Metric, angle: &[f64], gradients: &[[f64; 4]]) -> Result<Vec<f64>, ParamError> {
+    pub fn fit(
+        &mut self,
+        metric: &Metric,
+        angle: &[f64],
+        gradients: &[[f64; 4]],
+        weight: &[f64],
+    ) -> Result<Vec<f64>, ParamError> {
         expect_length("the list of angles", angle.len(), self.cut().turn.len())?;
         expect_length("the list of gradients", gradients.len(), angle.len())?;
-        let plain = Objective { anisotropy: 1.0, lengths: Vec::new(), stiffness: Vec::new() };
+        let size = |[a, b, c, d]: &[f64; 4]| (a * a + b * b + c * c + d * d).clamp(LEAST_SIZE, 1.0 / LEAST_SIZE);
+        let extra = |f: usize| weight.get(f).copied().unwrap_or(1.0);
+        let stiffness: Vec<f64> = gradients.iter().enumerate().map(|(f, g)| extra(f) / size(g)).collect();
+        let plain = Objective { anisotropy: 1.0, lengths: Vec::new(), stiffness };
         let (matrix, rhs) = self.assemble_with(|f| {
-            let (area, hats) = (metric.area(f), hats(metric, angle[f.index()], f));
+            let (area, hats) = (metric.area(f) * plain.stiffness[f.index()], hats(metric, angle[f.index()], f));
             let [ux, uy, vx, vy] = gradients[f.index()];
             let load = [DVec2::new(ux, uy), DVec2::new(vx, vy)].map(|g| hats.map(|hat| area * hat.dot(g)));
             Local { load, ..plain.local(metric, angle[f.index()], f) }
@@ -288,11 +300,6 @@ impl<'a> InjectiveEnergy<'a> {
         parts.into_iter().sum()
     }
 
-    /// Number of triangles that a map turns over or flattens.
-    pub fn folds(&self, uv: &[[DVec2; 3]]) -> usize {
-        uv.iter().filter(|w| (w[1] - w[0]).perp_dot(w[2] - w[0]) <= 0.0).count()
-    }
-
     fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> Derivatives {
         let (hats, area) = (self.hats(f), self.metric.area(FaceId::new(f)));
         let (slope, bend) = self.density(f).derivatives(&matrix(&hats, w));
@@ -325,6 +332,12 @@ impl<'a> InjectiveEnergy<'a> {
 pub fn gradients(metric: &Metric, angle: &[f64], uv: &[[DVec2; 3]]) -> Vec<[f64; 4]> {
     let each = |(f, w): (usize, &[DVec2; 3])| matrix(&hats(metric, angle[f], FaceId::new(f)), w);
     uv.iter().enumerate().map(each).collect()
+}
+
+/// The triangles that a map turns over or flattens.
+pub fn folds(uv: &[[DVec2; 3]]) -> Vec<FaceId> {
+    let folded = |w: &[DVec2; 3]| (w[1] - w[0]).perp_dot(w[2] - w[0]) <= 0.0;
+    uv.iter().enumerate().filter(|(_, w)| folded(w)).map(|(f, _)| FaceId::new(f)).collect()
 }
 
 fn matrix(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {

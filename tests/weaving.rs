@@ -138,7 +138,8 @@ fn sleeve_is_woven() {
 
 #[test]
 fn bunny_is_woven() {
-    finishes("bunny_7k", 36, 3..=6);
+    finishes("bunny_7k", 6, 3..=3);
+    finishes("bunny_7k_fine", 36, 3..=6);
 }
 
 #[test]

@@ -33,7 +33,7 @@ const STEP: f64 = 0.75 * 2.0 / 3.0;
 
 /// Share of the energy that a step without folds has to gain to be worth another, and how many may gain less in a row: the
 /// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
-const LITTLE: f64 = 5e-4;
+const LITTLE: f64 = 1e-3;
 const IDLE: usize = 2;
 /// Steps after which least squares are to have led to a map with few folds, and how many folds are few: from more on the
 /// map as a whole does not fit its constraints, and another start is quicker and finds one that does.

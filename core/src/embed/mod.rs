@@ -45,6 +45,8 @@ mod working;
 #[cfg(test)]
 mod samples;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
 
 pub use bending::face_curvature;

@@ -282,3 +282,66 @@ fn parts(corners: [u32; 3], sides: [HalfedgeId; 3], middle: [Option<u32>; 3], po
         _ => vec![([a, b, c], [x, y, z])],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{indices, is_chain, net};
+    use super::*;
+
+    #[test]
+    fn the_surface_the_layout_and_its_indices_stay() {
+        let net = net();
+        let sharp: Vec<bool> = net.mesh.edges().map(|e| e.0 % 3 == 0).collect();
+        let mark: Vec<u32> = (0..net.mesh.n_vertices() as u32).collect();
+        let (fine, carried) = net.finer_at_nodes(&net.angle, &sharp, &mark).unwrap().unwrap();
+        assert!(fine.mesh.n_faces() > net.mesh.n_faces());
+        assert_eq!(fine.mesh.euler_characteristic(), net.mesh.euler_characteristic());
+
+        let mut area = vec![0.0; net.mesh.n_faces()];
+        for f in fine.mesh.faces() {
+            area[fine.base_face[f.index()].index()] += fine.mesh.face_area(f);
+        }
+        for f in net.mesh.faces() {
+            assert!((area[f.index()] - net.mesh.face_area(f)).abs() < 1e-12, "{f:?} is covered once by its parts");
+        }
+        let length = |mesh: &TriMesh, sharp: &[bool]| -> f64 {
+            let sharp = mesh.edges().filter(|e| sharp[e.index()]);
+            sharp.map(|e| mesh.vector(mesh.halfedge(e)).length()).sum()
+        };
+        assert!((length(&fine.mesh, &carried.sharp) - length(&net.mesh, &sharp)).abs() < 1e-9);
+        assert_eq!(carried.at_vertex[..mark.len()], mark);
+        assert_eq!(carried.at_vertex.len(), fine.mesh.n_vertices());
+
+        assert_eq!(fine.nodes, net.nodes);
+        assert!((0..fine.arcs.len()).all(|a| is_chain(&fine, a)));
+        let mut wanted = vec![0; fine.mesh.n_vertices()];
+        fine.nodes.iter().for_each(|n| wanted[n.vertex.index()] = n.index());
+        assert_eq!(indices(&fine.mesh, &fine.jump), wanted);
+    }
+
+    #[test]
+    fn every_quarter_around_an_irregular_node_has_its_triangles() {
+        let mut net = net();
+        // As many as six triangles can never hold.
+        net.nodes[1].valence = 12;
+        let mark = vec![(); net.mesh.n_vertices()];
+        let mut fine = net.clone();
+        let mut carried = Carried { sharp: vec![false; net.mesh.n_edges()], at_vertex: mark };
+        for _ in 0..FANS {
+            let marks = link_of_nodes(&fine);
+            (fine, _, carried) = fine.halved(&fine.angle, &carried, &marks).unwrap();
+        }
+        for n in fine.nodes.iter().filter(|n| !n.is_regular()) {
+            assert!(fine.mesh.outgoing(n.vertex).count() >= PER_QUARTER * n.valence);
+        }
+        assert!((0..fine.arcs.len()).all(|a| is_chain(&fine, a)));
+    }
+
+    #[test]
+    fn without_irregular_nodes_nothing_is_refined() {
+        let mut net = net();
+        net.nodes.iter_mut().for_each(|n| n.valence = 4);
+        let (sharp, mark) = (vec![false; net.mesh.n_edges()], vec![(); net.mesh.n_vertices()]);
+        assert!(net.finer_at_nodes(&net.angle, &sharp, &mark).unwrap().is_none());
+    }
+}

@@ -134,50 +134,8 @@ fn cancel(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lift::vertex_index;
-    use super::super::{Net, headings};
-    use crate::dual::Arrangement;
-    use crate::field::Metric;
-    use crate::layout::{QuadLayout, embed};
-    use crate::mesh::{HalfedgeId, TriMesh};
-    use crate::progress::Progress;
-    use crate::testing::{column, row, torus};
-
-    /// A layout of two by two patches on a torus, whose first node is given the index of a node of valence 3 and whose
-    /// second that of one of valence 5: as for moving them, nothing else need be true of it.
-    fn net() -> Net {
-        let mesh = torus(24, 12);
-        let mut curves = vec![row(24, 1, true, 0.4), row(24, 7, true, 0.4)];
-        curves.extend([3, 14].map(|i| column(24, 12, i, true, 0.6)));
-        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
-        let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-        let drawing = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
-        let mut net = Net::new(&mesh, &drawing, &layout, &headings(&layout)).unwrap();
-        for (node, valence) in [(0, 3), (1, 5)] {
-            net.nodes[node].valence = valence;
-            let h = net.mesh.outgoing(net.nodes[node].vertex).next().unwrap();
-            let turns = if net.mesh.halfedge(net.mesh.edge(h)) == h { 1 } else { -1 };
-            net.jump[net.mesh.edge(h).index()] += turns * net.nodes[node].index();
-        }
-        net
-    }
-
-    fn indices(mesh: &TriMesh, jump: &[i32]) -> Vec<i32> {
-        let metric = Metric::new(mesh);
-        mesh.vertices().map(|v| vertex_index(mesh, &metric, jump, v)).collect()
-    }
-
-    fn is_chain(net: &Net, arc: usize) -> bool {
-        let a = &net.arcs[arc];
-        let mut face = net.mesh.face(a.start);
-        let joined = a.crossed.iter().all(|&h| {
-            let here = net.mesh.face(h) == face;
-            face = net.mesh.face(net.mesh.twin(h).unwrap());
-            here
-        });
-        let ends = [a.start, a.end].map(|h| net.mesh.origin(h));
-        joined && face == net.mesh.face(a.end) && ends == a.nodes.map(|n| net.nodes[n as usize].vertex)
-    }
+    use super::super::testing::{indices, is_chain, net};
+    use crate::mesh::HalfedgeId;
 
     #[test]
     fn a_node_takes_its_index_and_its_arcs_along() {

@@ -75,6 +75,8 @@ pub(super) enum Start<'s> {
     },
 }
 
+/// The most that directions may count in a triangle, as a multiple of the anisotropy: angles suffer where it is more.
+const FIRMEST: f64 = 4.0;
 /// Up to how many folds of the first guess of a map are worth removing one by one.
 const FEW: usize = 50;
 /// How often a first guess is fitted again with more weight on the triangles that fold, and by how much more.
@@ -298,9 +300,9 @@ impl Setting<'_> {
     }
 }
 
-/// How far directions are told by the shape of the surface: not at all where it bends alike in all directions, fully where
-/// principal curvatures differ by much more than on average. It is this difference, squared, by which the deviation from
-/// principal directions is measured.
+/// What share of the anisotropy counts in each triangle: none where the surface bends alike in all directions, all of it
+/// where principal curvatures differ as on average, and more where they differ more. It is this difference, squared, by
+/// which the deviation from principal directions is measured.
 fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
     let bent = |f: FaceId| {
         let corners = mesh.face_vertices(f).map(|v| &curvature[v.index()]);
@@ -312,7 +314,7 @@ fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
         (sum + a * each[f.index()], area + a)
     });
     let mean = (sum / area).max(f64::MIN_POSITIVE);
-    each.into_iter().map(|b| b / (b + mean)).collect()
+    each.into_iter().map(|b| (b / mean).min(FIRMEST)).collect()
 }
 
 /// A guide as strong as it agrees with the field at hand; `None` where it does not.

@@ -1,7 +1,7 @@
 //! Harmonic maps of discs onto convex shapes (Tutte; Floater).
 //!
-//! With positive weights and the border on a convex curve the map is one to one. The weights are cotangents,
-//! kept positive and of bounded ratio, so that slivers cannot spoil the system.
+//! With positive weights and the border on a convex curve the map is one to one. Cotangents as they are map a flat disc
+//! to itself, but may be negative; where that folds the map they are kept positive and of bounded ratio.
 //!
 //! A harmonic map shrinks limbs to almost nothing. Dividing the weights by the stretch at both their ends and
 //! mapping again gives them room, and the map stays one to one (Yoshizawa, Belyaev, Seidel: A fast and simple
@@ -30,8 +30,12 @@ const FACTOR: (f64, f64) = (1e-2, 1e2);
 ///
 /// When the linear system cannot be solved (no vertex of some component is fixed).
 pub(crate) fn relaxed(mesh: &TriMesh, fixed: &[Option<DVec2>]) -> Result<Vec<DVec2>, SolveError> {
-    let mut weights: Vec<f64> = mesh.edges().map(|e| weight(mesh, mesh.halfedge(e))).collect();
-    let mut map = solve(mesh, fixed, &weights)?;
+    let exact: Vec<f64> = mesh.edges().map(|e| cotangents(mesh, mesh.halfedge(e))).collect();
+    let mut weights: Vec<f64> = exact.iter().map(|w| w.clamp(WEIGHTS.0, WEIGHTS.1)).collect();
+    let mut map = match solve(mesh, fixed, &exact) {
+        Ok(map) if flipped(mesh, &map) == 0 => map,
+        _ => solve(mesh, fixed, &weights)?,
+    };
     if flipped(mesh, &map) > 0 {
         // Equal weights are coarser in shape, but untouched by bad triangles.
         weights.fill(1.0);
@@ -87,13 +91,13 @@ fn stretch(mesh: &TriMesh, map: &[DVec2]) -> (f64, Vec<f64>) {
     (total, squared.into_iter().map(|s| (s / mean).sqrt().clamp(FACTOR.0, FACTOR.1)).collect())
 }
 
-fn weight(mesh: &TriMesh, h: crate::mesh::HalfedgeId) -> f64 {
+/// Half the sum of the cotangents of the angles opposite an edge.
+fn cotangents(mesh: &TriMesh, h: crate::mesh::HalfedgeId) -> f64 {
     let cot = |h| {
         let a = mesh.corner_angle(mesh.prev(h));
         if a > 0.0 { a.cos() / a.sin().max(1e-6) } else { 0.0 }
     };
-    let both = cot(h) + mesh.twin(h).map_or(0.0, cot);
-    (0.5 * both).clamp(WEIGHTS.0, WEIGHTS.1)
+    0.5 * (cot(h) + mesh.twin(h).map_or(0.0, cot))
 }
 
 fn solve(mesh: &TriMesh, fixed: &[Option<DVec2>], weights: &[f64]) -> Result<Vec<DVec2>, SolveError> {
@@ -159,12 +163,23 @@ mod tests {
     use crate::testing::grid;
 
     #[test]
+    fn a_flat_disc_stays_as_it_is() {
+        let mesh =
+            grid(8, 8, [false, false], |u, v| glam::DVec3::new(u + 0.03 * (9.0 * v).sin() * u * (1.0 - u), v, 0.0));
+        let fixed: Vec<Option<DVec2>> =
+            mesh.vertices().map(|v| mesh.is_boundary_vertex(v).then(|| mesh.position(v).truncate())).collect();
+        for (v, at) in mesh.vertices().zip(relaxed(&mesh, &fixed).unwrap()) {
+            assert!(mesh.position(v).truncate().distance(at) < 1e-12);
+        }
+    }
+
+    #[test]
     fn a_limb_gets_room_in_a_map_that_stays_one_to_one() {
         let bump = |u: f64, v: f64| 2.0 * (-40.0 * ((u - 0.5).powi(2) + (v - 0.5).powi(2))).exp();
         let mesh = grid(24, 24, [false, false], |u, v| glam::DVec3::new(u, v, bump(u, v)));
         let fixed: Vec<Option<DVec2>> =
             mesh.vertices().map(|v| mesh.is_boundary_vertex(v).then(|| mesh.position(v).truncate())).collect();
-        let weights: Vec<f64> = mesh.edges().map(|e| weight(&mesh, mesh.halfedge(e))).collect();
+        let weights: Vec<f64> = mesh.edges().map(|e| cotangents(&mesh, mesh.halfedge(e))).collect();
         let harmonic = solve(&mesh, &fixed, &weights).unwrap();
         let map = relaxed(&mesh, &fixed).unwrap();
         assert_eq!(flipped(&mesh, &map), 0);

@@ -73,6 +73,9 @@ impl Density {
 
 /// The nearest positive semidefinite matrix: negative eigenvalues become zero (Jacobi's method).
 fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+    if is_definite(&matrix) {
+        return matrix;
+    }
     let mut a = matrix;
     let mut v = [[0.0; 4]; 4];
     for (i, row) in v.iter_mut().enumerate() {
@@ -95,6 +98,26 @@ fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
         }
     }
     out
+}
+
+/// Whether a symmetric matrix has a Cholesky factor: most have, and this is quicker than to find eigenvalues.
+fn is_definite(matrix: &[[f64; 4]; 4]) -> bool {
+    let mut l = [[0.0; 4]; 4];
+    for r in 0..4 {
+        for c in 0..=r {
+            let rest = matrix[r][c] - (0..c).map(|k| l[r][k] * l[c][k]).sum::<f64>();
+            if r == c {
+                // Also false if not a number.
+                if !(rest > 0.0) {
+                    return false;
+                }
+                l[r][r] = rest.sqrt();
+            } else {
+                l[r][c] = rest / l[c][c];
+            }
+        }
+    }
+    true
 }
 
 /// Makes entry `(p, q)` of a symmetric matrix vanish; `v` collects the rotations.

@@ -14,6 +14,9 @@
 //! Bijective Parameterization with Free Boundaries, 2015, section 3.3).
 
 mod density;
+mod energy;
+#[cfg(test)]
+mod tests;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -25,10 +28,12 @@ use super::seamless::SeamlessMap;
 use super::solve::SeamlessSystem;
 use super::{ParamError, expect_length};
 use crate::field::Metric;
-use crate::mesh::{FaceId, HalfedgeId};
+use crate::mesh::HalfedgeId;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::{SolveError, SparseHermitian, SpdSymbolic};
 pub(crate) use density::Density;
+use energy::Derivatives;
+pub use energy::{InjectiveEnergy, Shape, folds, gradients};
 
 /// Share of the way to the first flat triangle that a step may go.
 const SAFE: f64 = 0.8;
@@ -39,29 +44,10 @@ const HALVINGS: usize = 20;
 /// A step that gains less than this share of the energy is the last but for [`PATIENCE`] more.
 const GAIN: f64 = 2e-3;
 const PATIENCE: usize = 2;
-/// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
-/// much as twice the area of the triangles beside it.
-const PULL: f64 = 100.0;
 /// Area of images, where 1 is usual, below and above whose inverse differences are not weighed by it.
 const LEAST_SIZE: f64 = 1e-4;
 /// By what share the diagonal is raised: a semidefinite Hessian must become definite beyond rounding.
 const GROUND: f64 = 1e-9;
-
-/// What a map without folds is to be like.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shape {
-    /// By how much components across the field count more than those along it: `ρ`, at least 1.
-    pub anisotropy: f64,
-    /// How much size counts beside shape: `λ`, positive.
-    pub size: f64,
-}
-
-impl Shape {
-    /// What is wanted where only a share of the anisotropy counts.
-    pub(crate) fn softened(self, share: f64) -> Self {
-        Self { anisotropy: 1.0 + share * (self.anisotropy - 1.0), ..self }
-    }
-}
 
 /// A map without folds on its way down.
 #[derive(Debug, Clone)]
@@ -80,13 +66,6 @@ pub struct NewtonSystem {
     shares: Scatter,
     fold: Scatter,
     symbolic: SpdSymbolic,
-}
-
-/// The derivatives of the energy of a triangle.
-struct Derivatives {
-    gradient: [f64; 6],
-    /// The lower triangle, row by row, in the order u of the corners, v of the corners.
-    hessian: [f64; 21],
 }
 
 impl SeamlessSystem {
@@ -233,117 +212,6 @@ impl SeamlessSystem {
         matrix.raise_diagonal(GROUND);
         (matrix, downhill)
     }
-}
-
-/// The energy of maps on one mesh along one field.
-#[derive(Debug, Clone)]
-pub struct InjectiveEnergy<'a> {
-    metric: &'a Metric,
-    angle: &'a [f64],
-    objective: &'a Objective,
-    shape: Shape,
-    firmness: &'a [f64],
-    /// For each side of each triangle the coordinate that it is pulled towards an isoline of; empty: none.
-    pulled: Vec<[Option<u8>; 3]>,
-}
-
-impl<'a> InjectiveEnergy<'a> {
-    /// The energy of maps along the field of the angles given, of the sizes that `objective` wants. `firmness` tells for
-    /// each triangle which share of the anisotropy counts there, from 0 to 1; empty: all of it.
-    pub fn new(
-        metric: &'a Metric,
-        angle: &'a [f64],
-        objective: &'a Objective,
-        (shape, firmness): (Shape, &'a [f64]),
-    ) -> Self {
-        Self { metric, angle, objective, shape, firmness, pulled: Vec::new() }
-    }
-
-    /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v).
-    pub fn pulling(mut self, list: &[(HalfedgeId, u8)]) -> Self {
-        if !list.is_empty() {
-            self.pulled = vec![[None; 3]; self.angle.len()];
-        }
-        for &(h, axis) in list {
-            self.pulled[h.index() / 3][h.index() % 3] = Some(axis);
-        }
-        self
-    }
-
-    /// The sides of a triangle that are pulled: their corners, the coordinate, and how much it differs between them.
-    fn pulls(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = (usize, usize, usize, f64)> {
-        let sides = self.pulled.get(f).copied().unwrap_or_default();
-        sides.into_iter().enumerate().filter_map(move |(i, axis)| {
-            let (k, j) = (usize::from(axis?), (i + 1) % 3);
-            Some((i, j, k, w[j][k] - w[i][k]))
-        })
-    }
-
-    fn hats(&self, f: usize) -> [DVec2; 3] {
-        hats(self.metric, self.angle[f], FaceId::new(f))
-    }
-
-    fn density(&self, f: usize) -> Density {
-        let share = self.firmness.get(f).copied().unwrap_or(1.0);
-        Density::new(self.shape.softened(share), self.objective.target(FaceId::new(f)))
-    }
-
-    /// The energy of a map; `None` where a triangle is turned over or flat.
-    pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
-        let each = |(f, w): (usize, &[DVec2; 3])| {
-            let area = self.metric.area(FaceId::new(f));
-            let pull: f64 = self.pulls(f, w).map(|(.., d)| PULL * d * d).sum();
-            Some(area * self.density(f).value(&matrix(&self.hats(f), w))? + pull)
-        };
-        // Added up in order: the sum must not depend on threads.
-        let parts: Vec<Option<f64>> = uv.par_iter().enumerate().map(each).collect();
-        parts.into_iter().sum()
-    }
-
-    fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> Derivatives {
-        let (hats, area) = (self.hats(f), self.metric.area(FaceId::new(f)));
-        let (slope, bend) = self.density(f).derivatives(&matrix(&hats, w));
-        let mut gradient = [0.0; 6];
-        let mut hessian = [0.0; 21];
-        let mut entry = 0;
-        for i in 0..6 {
-            let (k, hat) = (2 * (i / 3), hats[i % 3]);
-            gradient[i] = area * (hat.x * slope[k] + hat.y * slope[k + 1]);
-            for j in 0..=i {
-                let (l, other) = (2 * (j / 3), hats[j % 3]);
-                let along = |r: usize| bend[r][l] * other.x + bend[r][l + 1] * other.y;
-                hessian[entry] = area * (hat.x * along(k) + hat.y * along(k + 1));
-                entry += 1;
-            }
-        }
-        for (i, j, k, d) in self.pulls(f, w) {
-            let (p, q) = (3 * k + i, 3 * k + j);
-            gradient[p] -= 2.0 * PULL * d;
-            gradient[q] += 2.0 * PULL * d;
-            for (r, c, sign) in [(p, p, 1.0), (q, q, 1.0), (p.max(q), p.min(q), -1.0)] {
-                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * PULL;
-            }
-        }
-        Derivatives { gradient, hessian }
-    }
-}
-
-/// The gradients `∇u` and `∇v` of a map in each triangle, in the frame of the field of the angles given.
-pub fn gradients(metric: &Metric, angle: &[f64], uv: &[[DVec2; 3]]) -> Vec<[f64; 4]> {
-    let each = |(f, w): (usize, &[DVec2; 3])| matrix(&hats(metric, angle[f], FaceId::new(f)), w);
-    uv.iter().enumerate().map(each).collect()
-}
-
-/// The triangles that a map turns over or flattens.
-pub fn folds(uv: &[[DVec2; 3]]) -> Vec<FaceId> {
-    let folded = |w: &[DVec2; 3]| (w[1] - w[0]).perp_dot(w[2] - w[0]) <= 0.0;
-    uv.iter().enumerate().filter(|(_, w)| folded(w)).map(|(f, _)| FaceId::new(f)).collect()
-}
-
-fn matrix(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {
-    let u = hats[0] * w[0].x + hats[1] * w[1].x + hats[2] * w[2].x;
-    let v = hats[0] * w[0].y + hats[1] * w[1].y + hats[2] * w[2].y;
-    [u.x, u.y, v.x, v.y]
 }
 
 /// The first time at which a triangle becomes flat when all corners go from one map to another at constant speed.

@@ -1,0 +1,129 @@
+//! Checks of maps without folds on shapes whose best maps are known.
+
+use glam::{DVec2, DVec3};
+
+use super::*;
+use crate::field::{CrossField, cross_field};
+use crate::mesh::{FaceId, TriMesh};
+use crate::testing::square;
+
+const SHAPE: Shape = Shape { anisotropy: 4.0, size: 0.2 };
+
+/// A unit square with the field along its sides.
+fn flat() -> (TriMesh, Metric, CrossField) {
+    let mesh = square(8);
+    let metric = Metric::new(&mesh);
+    let angle: Vec<f64> = mesh.faces().map(|f| metric.angle_of(&mesh, f, DVec3::X).unwrap()).collect();
+    let field = cross_field(&mesh, &metric, &angle, &vec![0; mesh.n_edges()]);
+    (mesh, metric, field)
+}
+
+/// Coordinates that a function of the place gives to the corners of all triangles.
+fn mapped(mesh: &TriMesh, map: impl Fn(DVec2) -> DVec2) -> Vec<[DVec2; 3]> {
+    mesh.faces().map(|f| mesh.face_vertices(f).map(|v| map(mesh.position(v).truncate()))).collect()
+}
+
+fn bent(p: DVec2) -> DVec2 {
+    1.5 * p + 0.15 * DVec2::new((7.0 * p.y).sin(), (5.0 * p.x).cos())
+}
+
+#[test]
+fn fitted_to_its_own_gradients_a_map_comes_back() {
+    let (mesh, metric, field) = flat();
+    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+    let uv = mapped(&mesh, bent);
+    let free = system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &uv), &[]).unwrap();
+    let got = system.map(&free).uv;
+    let origin = got[0][0] - uv[0][0];
+    for (a, b) in got.iter().flatten().zip(uv.iter().flatten()) {
+        assert!((*a - *b - origin).length() < 1e-12);
+    }
+}
+
+#[test]
+fn a_bent_square_becomes_straight_without_ever_folding() {
+    let (mesh, metric, field) = flat();
+    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+    let uv = mapped(&mesh, bent);
+    let free = system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &uv), &[]).unwrap();
+    let objective = Objective::default();
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
+    let mut at = system.injective(&energy, free).unwrap();
+    let newton = system.newton().unwrap();
+    let best = 1.0 + SHAPE.size;
+    let mut before = at.energy;
+    assert!(before > 1.5 * best);
+    for _ in 0..40 {
+        system.descend(&newton, &energy, &mut at, 1, &Progress::new()).unwrap();
+        assert!(at.energy <= before && folds(&at.map.uv).is_empty());
+        before = at.energy;
+    }
+    assert!((at.energy - best).abs() < 1e-9, "{}", at.energy - best);
+    for (f, g) in mesh.faces().zip(gradients(&metric, &field.angle, &at.map.uv)) {
+        let want = [1.0, 0.0, 0.0, 1.0];
+        assert!((0..4).all(|k| (g[k] - want[k]).abs() < 1e-4), "{f:?} {g:?}");
+    }
+}
+
+#[test]
+fn a_map_that_folds_has_no_energy() {
+    let (mesh, metric, field) = flat();
+    let system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+    let objective = Objective::default();
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
+    let mut uv = mapped(&mesh, |p| p);
+    assert!((energy.of(&uv).unwrap() - (1.0 + SHAPE.size)).abs() < 1e-12);
+    uv[5].swap(1, 2);
+    assert_eq!(folds(&uv), [FaceId(5)]);
+    assert_eq!(energy.of(&uv), None);
+    // All variables alike: every triangle is a point.
+    assert!(system.injective(&energy, vec![0.0; system.n_free()]).is_none());
+}
+
+#[test]
+fn the_derivatives_are_those_of_the_energy() {
+    let (mesh, metric, field) = flat();
+    let objective = Objective { lengths: vec![[1.2, 0.8]; mesh.n_faces()], ..Objective::default() };
+    let firmness: Vec<f64> = mesh.faces().map(|f| 0.1 * f64::from(f.0 % 10)).collect();
+    let pulled: Vec<_> = (0..20).map(|k| (HalfedgeId::new(11 * k), (k % 2) as u8)).collect();
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &firmness)).pulling(&pulled);
+    let uv = mapped(&mesh, bent);
+    for f in [0, 11, 40, 77] {
+        let exact = energy.derivatives(f, &uv[f]).gradient;
+        for (k, exact) in exact.into_iter().enumerate() {
+            let at = |d: f64| {
+                let mut moved = uv.clone();
+                moved[f][k % 3][k / 3] += d;
+                energy.of(&moved).unwrap()
+            };
+            let slope = (at(1e-6) - at(-1e-6)) / 2e-6;
+            assert!((slope - exact).abs() < 1e-6 * (1.0 + exact.abs()), "{f} {k}: {slope} {exact}");
+        }
+    }
+}
+
+#[test]
+fn features_are_pulled_towards_isolines() {
+    let (mesh, metric, field) = flat();
+    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+    // The diagonals of a column of quads: no isoline by themselves.
+    let slanted = |h: &HalfedgeId| {
+        let d = mesh.vector(*h);
+        d.x.abs() > 0.1 && d.y.abs() > 0.1 && mesh.position(mesh.origin(*h)).x < 0.3
+    };
+    let pulled: Vec<_> = mesh.halfedges().filter(slanted).map(|h| (h, 0)).collect();
+    assert!(!pulled.is_empty());
+    let objective = Objective::default();
+    let free =
+        system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &mapped(&mesh, |p| p)), &[]).unwrap();
+    let off = |map: &SeamlessMap| -> f64 {
+        let across =
+            |h: HalfedgeId| map.uv[h.index() / 3][(h.index() % 3 + 1) % 3].x - map.uv[h.index() / 3][h.index() % 3].x;
+        pulled.iter().map(|&(h, _)| across(h).abs()).fold(0.0, f64::max)
+    };
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).pulling(&pulled);
+    let mut at = system.injective(&energy, free).unwrap();
+    let before = off(&at.map);
+    system.descend(&system.newton().unwrap(), &energy, &mut at, 60, &Progress::new()).unwrap();
+    assert!(off(&at.map) < 0.2 * before, "{} {before}", off(&at.map));
+}

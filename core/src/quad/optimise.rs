@@ -41,7 +41,8 @@ pub(super) struct Around {
 }
 
 impl Around {
-    pub(super) fn new(mesh: &QuadMesh) -> Self {
+    /// Vertices of which `held` is true never move; those beyond its end are free.
+    pub(super) fn new(mesh: &QuadMesh, held: &[bool]) -> Self {
         let n = mesh.positions.len();
         let mut corners = vec![Vec::new(); n];
         for (q, quad) in (0u32..).zip(&mesh.quads) {
@@ -60,7 +61,9 @@ impl Around {
             if c == colours.len() {
                 colours.push(Vec::new());
             }
-            colours[c].push(v as u32);
+            if !held.get(v).is_some_and(|&h| h) {
+                colours[c].push(v as u32);
+            }
         }
         let given = mesh.quads.iter().map(|q| own_lengths(mesh, q)).collect();
         Self { corners, colours, given }

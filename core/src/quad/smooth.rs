@@ -52,13 +52,14 @@ pub fn land(mesh: &mut QuadMesh, base: &TriMesh) {
 }
 
 /// Smooths `mesh` on `base`, never to the worse: fewer folded quads first, then the mean scaled Jacobian.
-/// The structure of the mesh does not change.
+/// The structure of the mesh does not change. Vertices of which `held` is true stay where they are; those beyond its end
+/// are free.
 ///
 /// # Errors
 ///
 /// When cancelled; `mesh` is then as before.
-pub fn smooth(mesh: &mut QuadMesh, base: &TriMesh, progress: &Progress) -> Result<(), Cancelled> {
-    let around = Around::new(mesh);
+pub fn smooth(mesh: &mut QuadMesh, base: &TriMesh, held: &[bool], progress: &Progress) -> Result<(), Cancelled> {
+    let around = Around::new(mesh, held);
     let ground = Ground::new(base);
     let mut best = (quality(mesh), None);
     for kept in [KEPT, 0.0] {
@@ -132,12 +133,27 @@ mod tests {
         tangle(&mut mesh, &base, side);
         let before = quality(&mesh);
         assert!(before.0 > 20, "{before:?}");
-        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        smooth(&mut mesh, &base, &[], &Progress::new()).unwrap();
         let after = quality(&mesh);
         assert!(after.0 == 0 && after.1 > 0.85, "{before:?} {after:?}");
         let ground = Ground::new(&base);
         for (&p, &f) in mesh.positions.iter().zip(&mesh.base_face) {
             assert!(ground.follow(p, f).0.distance(p) < 1e-12, "vertices stay on the surface");
+        }
+    }
+
+    #[test]
+    fn what_is_held_stays() {
+        let base = torus(48, 24);
+        let mut mesh = grid(&base, (24, 48), true);
+        let side = mesh.positions[0].distance(mesh.positions[1]);
+        tangle(&mut mesh, &base, 0.3 * side);
+        let held: Vec<bool> = (0..mesh.positions.len()).map(|v| v % 5 == 0).collect();
+        let before = mesh.clone();
+        smooth(&mut mesh, &base, &held, &Progress::new()).unwrap();
+        assert!(quality(&mesh).1 > quality(&before).1);
+        for (v, held) in held.into_iter().enumerate() {
+            assert!(!held || mesh.positions[v] == before.positions[v]);
         }
     }
 
@@ -148,7 +164,7 @@ mod tests {
         tangle(&mut mesh, &base, 0.1);
         let corners: Vec<usize> = [0, 8, 72, 80].to_vec();
         let before = mesh.positions.clone();
-        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        smooth(&mut mesh, &base, &[], &Progress::new()).unwrap();
         assert_eq!(quality(&mesh).0, 0);
         for k in corners {
             assert_eq!(mesh.positions[k], before[k], "corners stay");
@@ -181,7 +197,7 @@ mod tests {
         let base = square(16);
         let mut mesh = grid(&base, (16, 16), false);
         let before = mesh.positions.clone();
-        smooth(&mut mesh, &base, &Progress::new()).unwrap();
+        smooth(&mut mesh, &base, &[], &Progress::new()).unwrap();
         assert!(mesh.positions.iter().zip(&before).all(|(p, q)| p.distance(*q) < 1e-9));
     }
 }

@@ -9,17 +9,17 @@ use std::time::Instant;
 
 use super::embedding::{Drawn, draw};
 use super::ground::Ground;
+use super::quads::quads;
 use super::report::{Before, Subject, Times, write_report};
 use super::session::{Session, WeaveError};
 use crate::embed::{
     self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings,
 };
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
-use crate::mesh::{FaceId, Normalization, TriMesh, write_obj};
+use crate::mesh::{Normalization, TriMesh, write_obj};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{QuadMesh, chord_counts, land, quality, refine, smooth, whole_counts};
-use crate::surface::{SurfacePoint, nearest_in_triangle};
+use crate::quad::{QuadMesh, chord_counts, whole_counts};
 use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
@@ -229,46 +229,6 @@ fn no_better(report: &EmbeddingReport, drawn: Option<&Measures>) -> Option<Strin
     let (before, after) = (drawn?.conformal, report.measures.conformal);
     (after >= before)
         .then(|| format!("the optimised map distorts more than the drawing: {after:.2} instead of {before:.2}"))
-}
-
-/// The refinement of an embedded layout, on the surface.
-fn quads(
-    sketch: &Sketch<'_>,
-    (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
-    optimised: bool,
-    counts: &[u32],
-    progress: &Progress,
-) -> Result<QuadMesh, WeaveError> {
-    let surface = sketch.surface;
-    progress.report("Refining to quads", 0.97);
-    let mut quads = refine(layout, embedding, maps, counts);
-    if optimised || sketch.proxy.is_some() {
-        land(&mut quads, surface.mesh);
-    }
-    let mesh = match sketch.proxy {
-        Some((proxy, original)) => {
-            carry(&mut quads, proxy, original);
-            land(&mut quads, original);
-            original
-        }
-        None => surface.mesh,
-    };
-    // Smoothing betters all figures of a smooth surface, but takes vertices off the features they were aligned to.
-    if !optimised || !surface.sharp.contains(&true) || quality(&quads).0 > 0 {
-        smooth(&mut quads, mesh, progress)?;
-    }
-    Ok(quads)
-}
-
-/// Carries quads from the proxy to the mesh it stands for.
-fn carry(quads: &mut QuadMesh, proxy: &Proxy, original: &TriMesh) {
-    let mesh = proxy.mesh();
-    for (position, face) in quads.positions.iter_mut().zip(&mut quads.base_face) {
-        let corners = mesh.face_vertices(FaceId(*face)).map(|v| mesh.position(v));
-        let at = SurfacePoint { face: FaceId(*face), weights: nearest_in_triangle(*position, &corners) };
-        let at = proxy.to_original(original, at);
-        (*position, *face) = (at.position(original), at.face.0);
-    }
 }
 
 /// The edge length of quads before patches are mapped, on a surface of bounding-box diagonal 1.

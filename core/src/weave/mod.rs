@@ -10,6 +10,7 @@ mod export;
 mod ground;
 mod layout;
 mod model;
+mod quads;
 mod recent;
 mod report;
 mod script;

@@ -301,20 +301,18 @@ impl Setting<'_> {
 }
 
 /// What share of the anisotropy counts in each triangle: none where the surface bends alike in all directions, all of it
-/// where principal curvatures differ as on average, and more where they differ more. It is this difference, squared, by
-/// which the deviation from principal directions is measured.
+/// where principal curvatures differ by as much as either is on average, and more where they differ more. It is
+/// this difference, squared, by which the deviation from principal directions is measured.
 fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
-    let bent = |f: FaceId| {
-        let corners = mesh.face_vertices(f).map(|v| &curvature[v.index()]);
-        corners.iter().map(|c| (c.k_max - c.k_min).powi(2)).sum::<f64>() / 3.0
+    let mean_at = |f: FaceId, of: fn(&PrincipalCurvature) -> f64| {
+        mesh.face_vertices(f).iter().map(|v| of(&curvature[v.index()])).sum::<f64>() / 3.0
     };
-    let each: Vec<f64> = mesh.faces().map(bent).collect();
     let (sum, area) = mesh.faces().fold((0.0, 0.0), |(sum, area), f| {
         let a = mesh.face_area(f);
-        (sum + a * each[f.index()], area + a)
+        (sum + a * mean_at(f, |c| c.k_max * c.k_max + c.k_min * c.k_min), area + a)
     });
-    let mean = (sum / area).max(f64::MIN_POSITIVE);
-    each.into_iter().map(|b| (b / mean).min(FIRMEST)).collect()
+    let mean = (0.5 * sum / area).max(f64::MIN_POSITIVE);
+    mesh.faces().map(|f| (mean_at(f, |c| (c.k_max - c.k_min).powi(2)) / mean).min(FIRMEST)).collect()
 }
 
 /// A guide as strong as it agrees with the field at hand; `None` where it does not.

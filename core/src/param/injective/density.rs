@@ -30,7 +30,7 @@ impl Density {
     pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
         let det = j[0] * j[3] - j[1] * j[2];
         let ratio = det / self.determinant;
-        let e = 0.5 * (self.norm(j) / det + self.size * (ratio + 1.0 / ratio));
+        let e = 0.5 * (self.norm(j) / det + self.size * (ratio * ratio + 1.0 / (ratio * ratio)));
         (det > 0.0 && e.is_finite()).then_some(e)
     }
 
@@ -50,9 +50,10 @@ impl Density {
         let turned = [j[3], -j[2], -j[1], j[0]];
         let weights = self.weights();
         let (norm, m) = (self.norm(j), self.determinant);
-        // e = ½ (N/D + λ (D/m + m/D)): first and second derivatives with respect to D.
-        let first = 0.5 * (-norm / (det * det) + self.size * (1.0 / m - m / (det * det)));
-        let second = (norm + self.size * m) / (det * det * det);
+        // e = ½ (N/D + λ (D²/m² + m²/D²)): first and second derivatives with respect to D.
+        let (square, ratio) = (det * det, m * m / (det * det));
+        let first = -0.5 * norm / square + self.size * (1.0 / ratio - ratio) / det;
+        let second = norm / (square * det) + self.size * (1.0 / ratio + 3.0 * ratio) / square;
         let mut gradient = [0.0; 4];
         let mut hessian = [[0.0; 4]; 4];
         for r in 0..4 {

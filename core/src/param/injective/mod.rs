@@ -5,11 +5,12 @@
 //! triangle grows beyond all bounds as its image becomes flat, and a step ends before that. Per triangle, with the map's
 //! matrix `J = [a b; c d]` in the frame of the field (rows `∇u`, `∇v`) and `m` the determinant wanted, it is
 //!
-//! `(a² + d² + ρ (b² + c²)) / (2 det J) + λ/2 (det J / m + m / det J)`.
+//! `(a² + d² + ρ (b² + c²)) / (2 det J) + λ/2 ((det J / m)² + (m / det J)²)`.
 //!
 //! With `ρ = 1` the first part is half of `σ₁/σ₂ + σ₂/σ₁`, the conformal distortion (Hormann and Greiner, MIPS, 2000);
 //! more makes directions count, as in the anisotropic norm (Campen, section 6.4.3). The second part keeps sizes near
-//! those wanted. It is minimised by Newton's method with each triangle's Hessian made positive semidefinite (Teran,
+//! those wanted: squared, so that it costs angles little as long as these are not far off, and yet no limb is mapped to
+//! almost nothing. It is minimised by Newton's method with each triangle's Hessian made positive semidefinite (Teran,
 //! Sifakis, Irving and Fedkiw, 2005), steps cut short before the first triangle would flatten (Smith and Schaefer,
 //! Bijective Parameterization with Free Boundaries, 2015, section 3.3).
 

@@ -138,17 +138,34 @@ impl<'w> Course<'w> {
         self.show(&optimizer);
         let safe = optimizer.state().clone();
         optimizer.release(job);
-        self.rest(&mut optimizer, (0.5, 0.85), progress)?;
-        progress.report("Moving nodes", 0.85);
-        let moved =
-            optimizer.finish(progress).and_then(|folds| finished(job, optimizer.state(), &folds, self.area, progress));
-        match moved {
+        self.rest(&mut optimizer, (0.5, 0.8), progress)?;
+        progress.report("Moving nodes", 0.8);
+        match self.held(job, &mut optimizer, progress) {
+            Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
+                tracing::debug!(%error, "nodes that were released cannot be held: they move held");
+                optimizer.begin_held(safe.clone());
+            }
+            done => return done,
+        }
+        self.rest(&mut optimizer, (0.8, 0.9), progress)?;
+        match self.held(job, &mut optimizer, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes stay where they were");
                 finished(job, &safe, &[], self.area, progress)
             }
             done => done,
         }
+    }
+
+    /// The embedding with all nodes held on their isolines.
+    fn held(
+        &self,
+        job: &Job<'_>,
+        optimizer: &mut Optimizer<'_>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let folds = optimizer.finish(progress)?;
+        finished(job, optimizer.state(), &folds, self.area, progress)
     }
 }
 

@@ -254,7 +254,14 @@ impl<'a> Optimizer<'a> {
     /// Begins anew with steps of usual length, as many as at first.
     pub(super) fn restart(&mut self) {
         self.pace.fill(1.0);
-        (self.halved, self.steps) = (0, 0);
+        (self.halved, self.idle, self.steps) = (0, 0, 0);
+    }
+
+    /// Begins anew where it once was, with all nodes held on their isolines.
+    pub(super) fn begin_held(&mut self, state: State) {
+        self.roads.hold_all();
+        self.state = state;
+        self.restart();
     }
 
     /// For each node whether it stays where it is.

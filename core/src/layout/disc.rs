@@ -1,7 +1,8 @@
 //! Harmonic maps of discs onto convex shapes (Tutte; Floater).
 //!
 //! With positive weights and the border on a convex curve the map is one to one. Cotangents as they are map a flat disc
-//! to itself, but may be negative; where that folds the map they are kept positive and of bounded ratio.
+//! to itself, but may be negative and, in slivers, of any size; where that does harm they are kept positive and of
+//! bounded ratio.
 //!
 //! A harmonic map shrinks limbs to almost nothing. Dividing the weights by the stretch at both their ends and
 //! mapping again gives them room, and the map stays one to one (Yoshizawa, Belyaev, Seidel: A fast and simple
@@ -23,19 +24,29 @@ const LESS: f64 = 0.9;
 /// Bounds of the factor by which one round changes a weight at one end.
 const FACTOR: (f64, f64) = (1e-2, 1e2);
 
+/// With which weights a map is made at first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum First {
+    /// Cotangents as they are, if they do not fold it: angles are kept best.
+    Conformal,
+    /// Positive ones of bounded ratio: slivers keep some width, as is wanted where lines are to be drawn across them.
+    Robust,
+}
+
 /// A one-to-one map of little stretch, with `fixed` vertices where they are told to be: harmonic at first, then
 /// again with weights divided by the stretch, for as long as that makes the stretch less.
 ///
 /// # Errors
 ///
 /// When the linear system cannot be solved (no vertex of some component is fixed).
-pub(crate) fn relaxed(mesh: &TriMesh, fixed: &[Option<DVec2>]) -> Result<Vec<DVec2>, SolveError> {
+pub(crate) fn relaxed(mesh: &TriMesh, fixed: &[Option<DVec2>], first: First) -> Result<Vec<DVec2>, SolveError> {
     let exact: Vec<f64> = mesh.edges().map(|e| cotangents(mesh, mesh.halfedge(e))).collect();
     let mut weights: Vec<f64> = exact.iter().map(|w| w.clamp(WEIGHTS.0, WEIGHTS.1)).collect();
-    let mut map = match solve(mesh, fixed, &exact) {
-        Ok(map) if flipped(mesh, &map) == 0 => map,
-        _ => solve(mesh, fixed, &weights)?,
-    };
+    let mut map = match first {
+        First::Conformal => solve(mesh, fixed, &exact).ok().filter(|map| flipped(mesh, map) == 0),
+        First::Robust => None,
+    }
+    .map_or_else(|| solve(mesh, fixed, &weights), Ok)?;
     if flipped(mesh, &map) > 0 {
         // Equal weights are coarser in shape, but untouched by bad triangles.
         weights.fill(1.0);
@@ -168,7 +179,7 @@ mod tests {
             grid(8, 8, [false, false], |u, v| glam::DVec3::new(u + 0.03 * (9.0 * v).sin() * u * (1.0 - u), v, 0.0));
         let fixed: Vec<Option<DVec2>> =
             mesh.vertices().map(|v| mesh.is_boundary_vertex(v).then(|| mesh.position(v).truncate())).collect();
-        for (v, at) in mesh.vertices().zip(relaxed(&mesh, &fixed).unwrap()) {
+        for (v, at) in mesh.vertices().zip(relaxed(&mesh, &fixed, First::Conformal).unwrap()) {
             assert!(mesh.position(v).truncate().distance(at) < 1e-12);
         }
     }
@@ -181,7 +192,7 @@ mod tests {
             mesh.vertices().map(|v| mesh.is_boundary_vertex(v).then(|| mesh.position(v).truncate())).collect();
         let weights: Vec<f64> = mesh.edges().map(|e| cotangents(&mesh, mesh.halfedge(e))).collect();
         let harmonic = solve(&mesh, &fixed, &weights).unwrap();
-        let map = relaxed(&mesh, &fixed).unwrap();
+        let map = relaxed(&mesh, &fixed, First::Conformal).unwrap();
         assert_eq!(flipped(&mesh, &map), 0);
         assert!(stretch(&mesh, &map).0 < 0.5 * stretch(&mesh, &harmonic).0);
     }

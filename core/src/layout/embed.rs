@@ -224,7 +224,7 @@ pub(super) fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>
             fixed[v as usize] = Some(DVec2::from_angle(std::f64::consts::TAU * turn));
         }
     }
-    disc::relaxed(disc, &fixed)
+    disc::relaxed(disc, &fixed, disc::First::Robust)
 }
 
 /// Length along a vertex path up to each of its vertices; each step counts, however short.

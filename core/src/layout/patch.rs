@@ -143,7 +143,7 @@ fn map_patch(
     }
     let fixed = rectangle_border(&mesh, &sides, size);
     let solve_error = |source| PatchError::Solve { patch: p, source };
-    let uv = disc::relaxed(&mesh, &fixed).map_err(solve_error)?;
+    let uv = disc::relaxed(&mesh, &fixed, disc::First::Conformal).map_err(solve_error)?;
     let flipped = disc::flipped(&mesh, &uv);
     let base_face = (0..refined.n_faces() as u32)
         .map(|f| embedding.base_face[faces[refined.base_face(f) as usize] as usize])

@@ -70,9 +70,9 @@ impl Drawn {
     }
 }
 
-/// How much size counts beside shape: enough to keep patches of one strip from shrinking away, little enough not to be
-/// paid for by angles.
-const SIZE: f64 = 0.03;
+/// How much size counts beside shape: enough to keep limbs and the patches of one strip from shrinking away, little enough
+/// not to be paid for by angles.
+const SIZE: f64 = 0.06;
 /// Steps of Newton's method for a first map: it has long converged by then.
 const STEPS: usize = 60;
 

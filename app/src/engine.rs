@@ -345,7 +345,7 @@ pub struct LayoutNode {
 pub struct EmbeddingStep {
     /// Steps made so far.
     pub step: usize,
-    /// The energy as a fraction of that at the start.
+    /// The energy as a fraction of that with which its phase began: least squares, then maps without folds.
     pub energy: f64,
     /// Triangles that the map turns over.
     pub flipped: usize,

@@ -23,11 +23,10 @@ pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
     let progress = &*interrupt.progress;
-    let mut first = None;
     let mut watch = |snapshot: &Snapshot| {
-        let percent = 100.0 * snapshot.energy / first.get_or_insert(snapshot.energy).max(f64::MIN_POSITIVE);
         if !arguments.quiet {
-            let Snapshot { step, flipped, .. } = snapshot;
+            let Snapshot { step, flipped, energy, .. } = snapshot;
+            let percent = 100.0 * energy;
             say(&format!(
                 "step {step}: energy {percent:.1} %, {flipped} folded, {:.1} s",
                 start.elapsed().as_secs_f64()

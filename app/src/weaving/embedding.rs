@@ -131,7 +131,7 @@ pub fn optimise(
         let model = session.model();
         let ends = drawn.layout.arcs.iter().map(|a| a.nodes).collect();
         let layout = layout.clone();
-        let mut steps = Steps { index: &model.index, mesh: &model.loaded.mesh, ends, layout, energy: None };
+        let mut steps = Steps { index: &model.index, mesh: &model.loaded.mesh, ends, layout };
         let mut relay = |snapshot: &Snapshot| match watch(steps.next(snapshot)) {
             ControlFlow::Continue(()) => Next::Continue,
             ControlFlow::Break(()) => Next::Finish,
@@ -167,8 +167,6 @@ struct Steps<'a> {
     /// The nodes at the ends of each arc.
     ends: Vec<[u32; 2]>,
     layout: LayoutPreview,
-    /// At the start.
-    energy: Option<f64>,
 }
 
 impl Steps<'_> {
@@ -186,9 +184,12 @@ impl Steps<'_> {
             }
             arc.sketched = snapshot.arcs.get(i).is_none_or(Option::is_none);
         }
-        let first = *self.energy.get_or_insert(snapshot.energy);
-        let energy = if first > 0.0 { snapshot.energy / first } else { 1.0 };
-        EmbeddingStep { step: snapshot.step, energy, flipped: snapshot.flipped, layout: self.layout.clone() }
+        EmbeddingStep {
+            step: snapshot.step,
+            energy: snapshot.energy,
+            flipped: snapshot.flipped,
+            layout: self.layout.clone(),
+        }
     }
 }
 

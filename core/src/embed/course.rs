@@ -26,12 +26,14 @@ pub(super) struct Course<'w> {
     area: f64,
     energy_before: f64,
     flipped_before: usize,
+    /// The energy with which the present phase began.
+    first: Option<f64>,
 }
 
 impl<'w> Course<'w> {
     pub(super) fn new(job: &Job<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
         let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
-        Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0 }
+        Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0, first: None }
     }
 
     pub(super) fn begin(job: &Job<'_>, optimizer: &Optimizer<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
@@ -43,7 +45,9 @@ impl<'w> Course<'w> {
     }
 
     pub(super) fn show(&mut self, optimizer: &Optimizer<'_>) {
-        self.next = (self.watch)(&optimizer.state().snapshot(self.steps));
+        let state = optimizer.state();
+        let first = *self.first.get_or_insert(state.solution.energy);
+        self.next = (self.watch)(&state.snapshot(self.steps, first));
     }
 
     /// Moves the nodes until they rest, which is a part of the whole work.
@@ -135,6 +139,7 @@ impl<'w> Course<'w> {
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
         let mut optimizer = start?.map_err(|_| EmbeddingError::Folded)?;
+        self.first = None;
         self.show(&optimizer);
         let safe = optimizer.state().clone();
         optimizer.release(job);
@@ -144,6 +149,7 @@ impl<'w> Course<'w> {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes that were released cannot be held: they move held");
                 optimizer.begin_held(safe.clone());
+                self.show(&optimizer);
             }
             done => return done,
         }

@@ -33,7 +33,8 @@ pub struct Job<'a> {
 pub struct Snapshot {
     /// Steps made so far.
     pub step: usize,
-    /// The energy of the map.
+    /// The energy of the map, as a fraction of that with which this phase began: least squares and maps without folds
+    /// have energies of their own.
     pub energy: f64,
     /// Triangles that the map turns over.
     pub flipped: usize,

@@ -69,11 +69,11 @@ impl State {
         self.net.nodes.iter().map(|n| n.vertex).collect()
     }
 
-    pub(super) fn snapshot(&self, step: usize) -> Snapshot {
+    pub(super) fn snapshot(&self, step: usize, first: f64) -> Snapshot {
         let vertices = self.vertices();
         Snapshot {
             step,
-            energy: self.solution.energy,
+            energy: if first > 0.0 { self.solution.energy / first } else { 1.0 },
             flipped: self.flipped(),
             arcs: preview_arcs(&self.net.mesh, &self.solution.map, &vertices, &self.chains()),
             nodes: vertices.iter().map(|&v| self.net.mesh.position(v)).collect(),

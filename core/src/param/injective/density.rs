@@ -108,8 +108,7 @@ fn is_definite(matrix: &[[f64; 4]; 4]) -> bool {
         for c in 0..=r {
             let rest = matrix[r][c] - (0..c).map(|k| l[r][k] * l[c][k]).sum::<f64>();
             if r == c {
-                // Also false if not a number.
-                if !(rest > 0.0) {
+                if rest <= 0.0 || rest.is_nan() {
                     return false;
                 }
                 l[r][r] = rest.sqrt();

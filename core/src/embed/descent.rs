@@ -4,13 +4,10 @@
 //! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
 //! another follows; if not, it is taken back and tried at half the length.
 
-use std::f64::consts::TAU;
+use glam::DVec3;
 
-use glam::{DVec2, DVec3};
-
-use super::cross::step_to_crossing;
-use super::gradient::{descent, injective_descent};
-use super::job::Job;
+use super::EmbeddingError;
+use super::job::{Job, Settings};
 use super::net::Net;
 use super::relocate::{Ground, Hold};
 use super::setup::{ground, mean_edge, sharp_edges};
@@ -19,17 +16,12 @@ use super::solver::{Aim, Features, Folded, Solver, Start};
 use super::spacing::{Spacing, lengths};
 use super::state::State;
 use super::straight::{ArcEnd, Crossroads};
-use super::{EmbeddingError, voronoi};
 use crate::field::{GuidedSystem, Metric};
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::VertexId;
 use crate::param::{SeamlessSystem, Shape, gradients};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
-use crate::surface::{PolarMap, PrincipalCurvature, SurfaceIndex};
-
-/// Length of a step over the length of the gradient: the estimator is half as long again as the gradient itself, and
-/// three quarters of the way to a parabola's minimum are safe (section 6.6.2).
-const STEP: f64 = 0.75 * 2.0 / 3.0;
+use crate::surface::PrincipalCurvature;
 
 /// Share of the energy that a step without folds has to gain to be worth another, and how many may gain less in a row: the
 /// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
@@ -49,56 +41,6 @@ const NEWTON_STEPS: usize = 4;
 /// Rings of triangles around a node that has changed its vertex in which the field turns markedly with it.
 const TURNED_RINGS: usize = 2;
 
-/// The surface a layout is embedded on.
-#[derive(Debug, Clone, Copy)]
-pub struct Surface<'a> {
-    /// Its mesh, of bounding-box diagonal 1.
-    pub mesh: &'a TriMesh,
-    /// Its points by nearness.
-    pub index: &'a SurfaceIndex,
-    /// Principal curvatures at its vertices.
-    pub curvature: &'a [PrincipalCurvature],
-    /// Whether each edge is sharp.
-    pub sharp: &'a [bool],
-}
-
-/// How an embedding is optimised.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Steps of the nodes at most: with least squares, and as many again without folds.
-    pub steps: usize,
-    /// Halvings of the step at most.
-    pub halvings: usize,
-    /// By how much an error of direction counts more than one of length.
-    pub anisotropy: f64,
-    /// Whether lengths may vary over the surface as the field wants it.
-    pub sizing: bool,
-    /// Least length of an arc in the map, in mean edges of the mesh.
-    pub spacing: f64,
-    /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
-    pub collapse: Option<f64>,
-    /// Whether chords are collapsed, one by one, as long as that makes the layout less irregular and the energy no more.
-    pub simplify: bool,
-    /// The edge length that all chords are to be multiples of in the end, likewise; `None`: lengths are free.
-    pub integer: Option<f64>,
-}
-
-impl Default for Settings {
-    /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
-    fn default() -> Self {
-        Self {
-            steps: 25,
-            halvings: 5,
-            anisotropy: 10.0,
-            sizing: true,
-            spacing: 1.5,
-            collapse: None,
-            simplify: false,
-            integer: None,
-        }
-    }
-}
-
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
     pub(super) ground: Ground<'a>,
@@ -112,7 +54,7 @@ pub struct Optimizer<'a> {
     pub(super) least: f64,
     pub(super) fewest: Vec<u32>,
     /// The ends of arcs at each node.
-    ends: Vec<Vec<ArcEnd>>,
+    pub(super) ends: Vec<Vec<ArcEnd>>,
     pub(super) guided: GuidedSystem,
     pub(super) seamless: Option<SeamlessSystem>,
     pub(super) sizes: Option<SpdSymbolic>,
@@ -122,7 +64,7 @@ pub struct Optimizer<'a> {
     pub(super) features: Features,
     pub(super) state: State,
     /// Factor of the steps of every node.
-    pace: Vec<f64>,
+    pub(super) pace: Vec<f64>,
     /// Where every node was headed when it last moved.
     heading: Vec<DVec3>,
     /// Steps taken back since one was made.
@@ -361,95 +303,6 @@ impl<'a> Optimizer<'a> {
         }
     }
 
-    /// The direction in space in which a node is to move.
-    fn heading_of(&self, i: usize) -> DVec3 {
-        let State { net, metric, .. } = &self.state;
-        let v = net.nodes[i].vertex;
-        if !self.roads.held[i] || self.ground.hold[i] == Hold::Fixed {
-            return DVec3::ZERO;
-        }
-        let d = self.downhill(v);
-        if d.is_finite() { self.in_space(&net.mesh, metric, v, d).normalize_or_zero() } else { DVec3::ZERO }
-    }
-
-    /// The descent direction at a vertex, as a vector of its polar map.
-    fn downhill(&self, v: VertexId) -> DVec2 {
-        let State { net, metric, field, objective, firmness, solution } = &self.state;
-        let (mesh, angle, uv) = (&net.mesh, &field.angle, &solution.map.uv);
-        match self.shape {
-            // Error weights of 1 and ρ instead of 1 and 1 make the energy steeper, but its minimum no farther.
-            None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
-            // About its minimum the energy rises half as fast.
-            Some(shape) => {
-                injective_descent(mesh, metric, angle, uv, (objective, shape, firmness), v)
-                    / (0.25 * (1.0 + shape.anisotropy))
-            }
-        }
-    }
-
-    /// The net with every node moved by one step but for those that stay.
-    fn moved(&self, cell: &[u32], stays: &[bool]) -> Net {
-        let State { net, metric, .. } = &self.state;
-        let mut moved = net.clone();
-        for (i, node) in net.nodes.iter().enumerate() {
-            let v = node.vertex;
-            if self.ground.hold[i] == Hold::Fixed || stays[i] {
-                continue;
-            }
-            if !self.roads.held[i] {
-                self.cross(&mut moved, i, cell);
-                continue;
-            }
-            let step = self.downhill(v) * (STEP * self.pace[i]);
-            if !(step.length() > 0.0 && step.is_finite()) {
-                continue;
-            }
-            match self.ground.hold[i] {
-                Hold::Free => {
-                    // The polar map is that of the mesh before any node moved: close by nothing else changes.
-                    self.ground.glide(&mut moved, metric, i, step, cell);
-                }
-                Hold::Curve => {
-                    let along = self.in_space(&net.mesh, metric, v, step);
-                    self.ground.slide(&mut moved, i, along, along.length());
-                }
-                Hold::Fixed => {}
-            }
-        }
-        moved
-    }
-
-    /// Brings a regular node towards the crossing of its isolines.
-    fn cross(&self, moved: &mut Net, i: usize, cell: &[u32]) {
-        let State { net, metric, solution, .. } = &self.state;
-        let found = step_to_crossing(net, &self.roads, metric, &solution.map, &self.ends[i]);
-        let Some((corner, step)) = found.filter(|(_, step)| step.is_finite() && step.length() > 0.0) else { return };
-        let mesh = &net.mesh;
-        let v = net.nodes[i].vertex;
-        match self.ground.hold[i] {
-            Hold::Free => {
-                let polar = PolarMap::new(mesh, metric, v);
-                let from = polar.spokes.iter().find(|s| s.0 == corner).map_or(0.0, |s| s.1);
-                let turn = step.to_angle() - metric.direction(corner);
-                let turn = turn - (turn / TAU).round() * TAU;
-                let step = DVec2::from_angle(from + polar.scale * turn) * step.length();
-                self.ground.glide(moved, metric, i, step, cell);
-            }
-            Hold::Curve => {
-                let along = metric.tangent(mesh, mesh.face(corner), step.to_angle()) * step.length();
-                self.ground.slide(moved, i, along, along.length());
-            }
-            Hold::Fixed => {}
-        }
-    }
-
-    /// A vector of the polar map of `v` in space.
-    fn in_space(&self, mesh: &TriMesh, metric: &Metric, v: VertexId, step: DVec2) -> DVec3 {
-        let polar = PolarMap::new(mesh, metric, v);
-        let (h, turn) = polar.wedge(step.to_angle().rem_euclid(TAU));
-        metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
-    }
-
     /// Field and map of a net, with the field at hand as the one before.
     ///
     /// # Errors
@@ -510,20 +363,6 @@ impl<'a> Optimizer<'a> {
             }
         }
         turned
-    }
-
-    /// The net with regular nodes, and only these, brought to the crossings of their isolines but for those that stay.
-    pub(super) fn settled(&self, cell: &[u32], stays: &[bool]) -> Net {
-        let mut moved = self.state.net.clone();
-        for i in (0..moved.nodes.len()).filter(|&i| !stays[i] && !self.roads.held[i]) {
-            self.cross(&mut moved, i, cell);
-        }
-        moved
-    }
-
-    fn cells(&self) -> Vec<u32> {
-        let net = &self.state.net;
-        voronoi::cells(&net.mesh, &net.nodes.iter().map(|n| n.vertex).collect::<Vec<_>>())
     }
 }
 

@@ -80,7 +80,10 @@ impl Optimizer<'_> {
         self.features = Features::Held;
         match self.attempt(self.state.net.clone(), progress)? {
             Ok(state) => self.state = state,
-            Err(_) => tracing::debug!("features are not isolines exactly"),
+            Err(_) => {
+                self.features = Features::Pulled;
+                tracing::debug!("features are not isolines exactly");
+            }
         }
         Ok(())
     }

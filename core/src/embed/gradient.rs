@@ -49,7 +49,7 @@ pub(super) fn injective_descent(
 ) -> DVec2 {
     let share = |w: &Wedge| firmness.get(w.face.index()).copied().unwrap_or(1.0);
     let wedges = wedges(mesh, metric, angle, uv, objective, v);
-    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.softened(share(w)))).sum()
+    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.at_firmness(share(w)))).sum()
 }
 
 fn wedges(

@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
-use super::descent::{Optimizer, Surface};
-use super::job::Job;
+use super::descent::Optimizer;
+use super::job::{Job, Surface};
 use super::net::Net;
 use super::solver::{Aim, Features, Folded, Start};
 use super::state::State;

@@ -4,10 +4,61 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::collapse::{CollapsedChord, ShortChord};
-use super::descent::{Settings, Surface};
 use super::measures::Measures;
 use super::net::Headings;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
+use crate::mesh::TriMesh;
+use crate::surface::{PrincipalCurvature, SurfaceIndex};
+
+/// The surface a layout is embedded on.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface<'a> {
+    /// Its mesh, of bounding-box diagonal 1.
+    pub mesh: &'a TriMesh,
+    /// Its points by nearness.
+    pub index: &'a SurfaceIndex,
+    /// Principal curvatures at its vertices.
+    pub curvature: &'a [PrincipalCurvature],
+    /// Whether each edge is sharp.
+    pub sharp: &'a [bool],
+}
+
+/// How an embedding is optimised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Steps of the nodes at most: with least squares, and as many again without folds.
+    pub steps: usize,
+    /// Halvings of the step at most.
+    pub halvings: usize,
+    /// By how much an error of direction counts more than one of length.
+    pub anisotropy: f64,
+    /// Whether lengths may vary over the surface as the field wants it.
+    pub sizing: bool,
+    /// Least length of an arc in the map, in mean edges of the mesh.
+    pub spacing: f64,
+    /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
+    pub collapse: Option<f64>,
+    /// Whether chords are collapsed, one by one, as long as that makes the layout less irregular and the energy no more.
+    pub simplify: bool,
+    /// The edge length that all chords are to be multiples of in the end, likewise; `None`: lengths are free.
+    pub integer: Option<f64>,
+}
+
+impl Default for Settings {
+    /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
+    fn default() -> Self {
+        Self {
+            steps: 25,
+            halvings: 5,
+            anisotropy: 10.0,
+            sizing: true,
+            spacing: 1.5,
+            collapse: None,
+            simplify: false,
+            integer: None,
+        }
+    }
+}
 
 /// A layout to be embedded.
 #[derive(Debug, Clone, Copy)]

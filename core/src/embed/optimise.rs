@@ -3,8 +3,8 @@
 use super::EmbeddingError;
 use super::collapse::Collapse;
 use super::course::Course;
-use super::descent::{Optimizer, Settings};
-use super::job::{Embedded, Job, Next, Snapshot};
+use super::descent::Optimizer;
+use super::job::{Embedded, Job, Next, Settings, Snapshot};
 use super::shorter::Shorter;
 use crate::progress::Progress;
 

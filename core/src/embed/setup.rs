@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::descent::{Settings, Surface};
+use super::job::{Settings, Surface};
 use super::net::Net;
 use super::relocate::{Ground, Hold};
 use crate::mesh::{TriMesh, VertexId};

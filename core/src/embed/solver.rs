@@ -4,9 +4,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-use super::descent::Settings;
 use super::finish::raise;
 use super::guides::{feature_guides, shape_guides};
+use super::job::Settings;
 use super::net::Net;
 use super::sizing::{SizingSystem, rest_turns};
 use super::spacing::Spacing;
@@ -83,7 +83,7 @@ const FEW: usize = 50;
 const REFITS: usize = 2;
 const FIRMER: f64 = 9.0;
 
-/// The triangles that fold in the first guess of a map that is to have none; not empty.
+/// The triangles that fold in the first guess of a map that is to have none; empty if some are only flat.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Folded(pub Vec<FaceId>);
 
@@ -263,25 +263,7 @@ impl Setting<'_> {
             }
         };
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
-        let mut free = system.fit(metric, &field.angle, &wanted, &[])?;
-        let mut folded = folds(&system.map(&free).uv);
-        let mut weight = vec![1.0; wanted.len()];
-        for _ in 0..REFITS {
-            if folded.is_empty() || folded.len() > FEW {
-                break;
-            }
-            progress.check()?;
-            let mut list = vec![false; wanted.len()];
-            folded.iter().for_each(|f| list[f.index()] = true);
-            raise(&net.mesh, &list, FIRMER, &mut weight);
-            free = system.fit(metric, &field.angle, &wanted, &weight)?;
-            let left = folds(&system.map(&free).uv);
-            tracing::debug!(folds = folded.len(), left = left.len(), "fitted again");
-            if left.len() >= folded.len() {
-                break;
-            }
-            folded = left;
-        }
+        let (free, folded) = self.fitted(system, &wanted, progress)?;
         let mut found = system.injective(&energy, free.clone());
         if found.is_none() && folded.len() <= FEW {
             let quarters = net.quarters();
@@ -298,9 +280,39 @@ impl Setting<'_> {
         let Injective { map, free, energy } = at;
         Ok(Ok(Solution { map, free, energy }))
     }
+
+    /// The map whose gradients come nearest to those wanted, as far as can be without folds, and the triangles that fold.
+    fn fitted(
+        &self,
+        system: &mut SeamlessSystem,
+        wanted: &[[f64; 4]],
+        progress: &Progress,
+    ) -> Result<(Vec<f64>, Vec<FaceId>), EmbeddingError> {
+        let Self { net, metric, field, .. } = *self;
+        let mut free = system.fit(metric, &field.angle, wanted, &[])?;
+        let mut folded = folds(&system.map(&free).uv);
+        let mut weight = vec![1.0; wanted.len()];
+        for _ in 0..REFITS {
+            progress.check()?;
+            if folded.is_empty() || folded.len() > FEW {
+                break;
+            }
+            let mut list = vec![false; wanted.len()];
+            folded.iter().for_each(|f| list[f.index()] = true);
+            raise(&net.mesh, &list, FIRMER, &mut weight);
+            let again = system.fit(metric, &field.angle, wanted, &weight)?;
+            let left = folds(&system.map(&again).uv);
+            tracing::debug!(folds = folded.len(), left = left.len(), "fitted again");
+            if left.len() >= folded.len() {
+                break;
+            }
+            (free, folded) = (again, left);
+        }
+        Ok((free, folded))
+    }
 }
 
-/// What share of the anisotropy counts in each triangle: none where the surface bends alike in all directions, all of it
+/// By what factor the anisotropy counts in each triangle: 0 where the surface bends alike in all directions, 1
 /// where principal curvatures differ by as much as either is on average, and more where they differ more. It is
 /// this difference, squared, by which the deviation from principal directions is measured.
 fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {

@@ -20,7 +20,7 @@ pub struct State {
     pub field: CrossField,
     /// What the map minimises.
     pub objective: Objective,
-    /// For each triangle the share of the anisotropy that counts in a map without folds.
+    /// For each triangle the factor by which the anisotropy counts in a map without folds.
     pub firmness: Vec<f64>,
     /// The map and its energy.
     pub solution: Solution,

@@ -296,6 +296,10 @@ impl SeamlessSystem {
     ) -> Result<Unfolded, ParamError> {
         expect_length("the list of triangles", triangles.len(), self.cut.turn.len())?;
         expect_length("the list of free variables", y.len(), self.n_free())?;
+        let n_vertices = triangles.iter().flat_map(|t| t.vertices).max().map_or(0, |v| v as usize + 1);
+        if quarters.len() < n_vertices {
+            expect_length("the list of angles around vertices", quarters.len(), n_vertices)?;
+        }
         let problem = OrientationProblem { triangles, reduction: &self.tied.reduction, quarters };
         Ok(unfold(&problem, y, effort, progress)?)
     }

@@ -43,6 +43,10 @@ pub(super) fn quads(
     if !aligned || sketch.proxy.is_none() || quality(&quads).0 > 0 {
         let held = if aligned && sketch.proxy.is_none() { on_features(&quads, &surface) } else { Vec::new() };
         smooth(&mut quads, mesh, &held, progress)?;
+        // A fold is worse than a vertex beside its feature.
+        if held.contains(&true) && quality(&quads).0 > 0 {
+            smooth(&mut quads, mesh, &[], progress)?;
+        }
     }
     Ok(quads)
 }

@@ -21,9 +21,9 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// What is wanted where only a share of the anisotropy counts.
-    pub(crate) fn softened(self, share: f64) -> Self {
-        Self { anisotropy: 1.0 + share * (self.anisotropy - 1.0), ..self }
+    /// What is wanted where the anisotropy counts by a factor: 0 not at all, 1 as it is.
+    pub(crate) fn at_firmness(self, firmness: f64) -> Self {
+        Self { anisotropy: 1.0 + firmness * (self.anisotropy - 1.0), ..self }
     }
 }
 
@@ -48,7 +48,7 @@ pub struct InjectiveEnergy<'a> {
 
 impl<'a> InjectiveEnergy<'a> {
     /// The energy of maps along the field of the angles given, of the sizes that `objective` wants. `firmness` tells for
-    /// each triangle which share of the anisotropy counts there, 1 being all of it; empty: all.
+    /// each triangle by what factor the anisotropy counts there; empty: 1 everywhere.
     pub fn new(
         metric: &'a Metric,
         angle: &'a [f64],
@@ -84,7 +84,7 @@ impl<'a> InjectiveEnergy<'a> {
 
     fn density(&self, f: usize) -> Density {
         let share = self.firmness.get(f).copied().unwrap_or(1.0);
-        Density::new(self.shape.softened(share), self.objective.target(FaceId::new(f)))
+        Density::new(self.shape.at_firmness(share), self.objective.target(FaceId::new(f)))
     }
 
     /// The energy of a map; `None` where a triangle is turned over or flat.

@@ -23,6 +23,13 @@ fn mapped(mesh: &TriMesh, map: impl Fn(DVec2) -> DVec2) -> Vec<[DVec2; 3]> {
     mesh.faces().map(|f| mesh.face_vertices(f).map(|v| map(mesh.position(v).truncate()))).collect()
 }
 
+/// The system of a square, and the free variables of the map nearest to coordinates given.
+fn fitted(mesh: &TriMesh, metric: &Metric, field: &CrossField, uv: &[[DVec2; 3]]) -> (SeamlessSystem, Vec<f64>) {
+    let mut system = SeamlessSystem::new(mesh, field, &[], &[]).unwrap();
+    let free = system.fit(metric, &field.angle, &gradients(metric, &field.angle, uv), &[]).unwrap();
+    (system, free)
+}
+
 fn bent(p: DVec2) -> DVec2 {
     1.5 * p + 0.15 * DVec2::new((7.0 * p.y).sin(), (5.0 * p.x).cos())
 }
@@ -30,9 +37,8 @@ fn bent(p: DVec2) -> DVec2 {
 #[test]
 fn fitted_to_its_own_gradients_a_map_comes_back() {
     let (mesh, metric, field) = flat();
-    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
     let uv = mapped(&mesh, bent);
-    let free = system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &uv), &[]).unwrap();
+    let (system, free) = fitted(&mesh, &metric, &field, &uv);
     let got = system.map(&free).uv;
     let origin = got[0][0] - uv[0][0];
     for (a, b) in got.iter().flatten().zip(uv.iter().flatten()) {
@@ -43,9 +49,8 @@ fn fitted_to_its_own_gradients_a_map_comes_back() {
 #[test]
 fn a_bent_square_becomes_straight_without_ever_folding() {
     let (mesh, metric, field) = flat();
-    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
     let uv = mapped(&mesh, bent);
-    let free = system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &uv), &[]).unwrap();
+    let (system, free) = fitted(&mesh, &metric, &field, &uv);
     let objective = Objective::default();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
     let mut at = system.injective(&energy, free).unwrap();
@@ -105,7 +110,6 @@ fn the_derivatives_are_those_of_the_energy() {
 #[test]
 fn features_are_pulled_towards_isolines() {
     let (mesh, metric, field) = flat();
-    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
     // The diagonals of a column of quads: no isoline by themselves.
     let slanted = |h: &HalfedgeId| {
         let d = mesh.vector(*h);
@@ -114,8 +118,7 @@ fn features_are_pulled_towards_isolines() {
     let pulled: Vec<_> = mesh.halfedges().filter(slanted).map(|h| (h, 0)).collect();
     assert!(!pulled.is_empty());
     let objective = Objective::default();
-    let free =
-        system.fit(&metric, &field.angle, &gradients(&metric, &field.angle, &mapped(&mesh, |p| p)), &[]).unwrap();
+    let (system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, |p| p));
     let off = |map: &SeamlessMap| -> f64 {
         let across =
             |h: HalfedgeId| map.uv[h.index() / 3][(h.index() % 3 + 1) % 3].x - map.uv[h.index() / 3][h.index() % 3].x;

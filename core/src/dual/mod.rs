@@ -7,8 +7,10 @@ mod assess;
 mod insert;
 mod refined;
 mod slots;
+mod untangle;
 
 pub use arrangement::{Arrangement, ArrangementError, Crossing, End, Region, Segment, Side, SideKind};
 pub use assess::{Colour, Finding, RegionReport, assess, vertex_curvatures};
 pub(crate) use refined::Cost;
 pub use refined::{Mark, NoRoute, RefinedMesh, next, prev};
+pub use untangle::untangle;

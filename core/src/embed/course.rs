@@ -44,6 +44,16 @@ impl<'w> Course<'w> {
         course
     }
 
+    /// The course that goes on on another mesh.
+    pub(super) fn going_on(
+        job: &Job<'_>,
+        report: &EmbeddingReport,
+        watch: &'w mut dyn FnMut(&Snapshot) -> Next,
+    ) -> Self {
+        let EmbeddingReport { steps, energy_before, flipped_before, .. } = *report;
+        Self { steps, energy_before, flipped_before, ..Self::new(job, watch) }
+    }
+
     pub(super) fn show(&mut self, optimizer: &Optimizer<'_>) {
         let state = optimizer.state();
         let first = *self.first.get_or_insert(state.solution.energy);
@@ -125,10 +135,14 @@ impl<'w> Course<'w> {
                 })?
             }
         };
-        let report = &mut done.report;
+        self.enter(&mut done.report);
+        Ok(done)
+    }
+
+    /// Enters into a report what happened on the way.
+    pub(super) fn enter(&self, report: &mut EmbeddingReport) {
         (report.steps, report.energy_before, report.flipped_before) =
             (self.steps, self.energy_before, self.flipped_before);
-        Ok(done)
     }
 
     /// Moves the nodes with a map that never folds.

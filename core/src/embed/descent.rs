@@ -27,6 +27,8 @@ use crate::surface::PrincipalCurvature;
 /// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
 const LITTLE: f64 = 1e-3;
 const IDLE: usize = 2;
+/// Halvings of such a step at most: what does not help at a quarter of its length is more than a matter of length.
+const HALVINGS: usize = 2;
 /// Steps after which least squares are to have led to a map with few folds, and how many folds are few: from more on the
 /// map as a whole does not fit its constraints, and another start is quicker and finds one that does.
 const TRIAL: usize = 4;
@@ -185,7 +187,8 @@ impl<'a> Optimizer<'a> {
 
     /// Whether no further step is to be made.
     pub fn is_done(&self) -> bool {
-        self.steps >= self.settings.steps || self.halved > self.settings.halvings || self.idle >= IDLE
+        let halvings = if self.shape.is_some() { self.settings.halvings.min(HALVINGS) } else { self.settings.halvings };
+        self.steps >= self.settings.steps || self.halved > halvings || self.idle >= IDLE
     }
 
     /// The share of the steps at most that are made.

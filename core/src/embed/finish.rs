@@ -19,6 +19,8 @@ const FADING: usize = 5;
 const FADE: f64 = 0.7;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
+/// By what share the energy changes when they have come there.
+const SETTLED: f64 = 3e-3;
 
 impl Optimizer<'_> {
     /// Ends the optimisation: brings regular nodes onto their isolines and holds them there, and removes folds. Returned
@@ -29,9 +31,11 @@ impl Optimizer<'_> {
     /// See [`EmbeddingError`].
     pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
         for _ in 0..SETTLING {
-            match self.as_far_as_possible(Self::settled, progress)? {
-                (Some(state), _) => self.state = state,
-                (None, _) => break,
+            let before = self.state.solution.energy;
+            let (Some(state), _) = self.as_far_as_possible(Self::settled, progress)? else { break };
+            self.state = state;
+            if (self.state.solution.energy - before).abs() < SETTLED * before {
+                break;
             }
         }
         if self.shape.is_none() {

@@ -29,6 +29,8 @@ pub(super) struct Drawn {
     pub embedding: Embedding,
     /// The coordinates of the corners of each triangle, in the chart of its patch.
     pub uv: Vec<[DVec2; 3]>,
+    /// The patch of each triangle.
+    pub patch: Vec<u32>,
 }
 
 impl Drawn {
@@ -36,9 +38,9 @@ impl Drawn {
     pub(super) fn new(layout: &QuadLayout, drawing: &Embedding, progress: &Progress) -> Result<Self, EmbeddingError> {
         let maps = map_patches(layout, drawing, progress)?;
         let mut positions: Vec<DVec3> = drawing.mesh.positions.clone();
-        let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut faces, mut base_face, mut uv, mut patch) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut seeds = Vec::with_capacity(maps.len());
-        for PatchMap { mesh, whole, base_face: base, uv: at, .. } in &maps {
+        for (p, PatchMap { mesh, whole, base_face: base, uv: at, .. }) in (0..).zip(&maps) {
             let first_new = positions.len() - whole.len();
             let global = |v: usize| whole.get(v).copied().unwrap_or((first_new + v) as u32);
             positions.extend(&mesh.positions()[whole.len()..]);
@@ -49,6 +51,7 @@ impl Drawn {
                 uv.push(corners.map(|v| at[v.index()]));
             }
             base_face.extend(base);
+            patch.resize(faces.len(), p);
         }
         let mesh = TriMesh::from_faces(positions, &faces)?;
         let mut refined = RefinedMesh::new(&mesh);
@@ -66,7 +69,7 @@ impl Drawn {
             seeds,
             mesh: refined,
         };
-        Ok(Self { mesh, base_face, embedding, uv })
+        Ok(Self { mesh, base_face, embedding, uv, patch })
     }
 }
 
@@ -84,12 +87,26 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Result<Self, Folded>, EmbeddingError> {
         let drawn = Drawn::new(job.layout, job.drawing, progress)?;
+        Self::from_drawn(job, &drawn, &drawn.uv, progress)
+    }
+
+    /// As [`Self::from_drawing`], from a map near to that with coordinates `uv` of the corners of each triangle.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn from_drawn(
+        job: &Job<'a>,
+        drawn: &Drawn,
+        uv: &[[DVec2; 3]],
+        progress: &Progress,
+    ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
         for f in &mut net.base_face {
             *f = FaceId(drawn.base_face[f.index()]);
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
+        let aim = Aim::Injective { shape: shape(job), start: Start::Map(uv), steps: STEPS };
         Self::on(job, (net, sharp, curvature), (aim, Features::Pulled), progress)
     }
 

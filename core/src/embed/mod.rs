@@ -8,6 +8,7 @@
 
 mod alignment;
 mod bending;
+mod coarse;
 mod collapse;
 mod course;
 mod cross;
@@ -121,6 +122,9 @@ pub enum EmbeddingError {
     /// What is left without collapsed chords could not be drawn.
     #[error(transparent)]
     Redraw(#[from] crate::layout::RedrawError),
+    /// The mesh could not be simplified to embed the layout on that first.
+    #[error(transparent)]
+    Proxy(#[from] crate::proxy::ProxyError),
     /// The patches of the drawing could not be mapped.
     #[error(transparent)]
     Patch(#[from] PatchError),

@@ -1,11 +1,11 @@
 //! Optimising the embedding of a layout, with chords collapsed where that is asked for.
 
-use super::EmbeddingError;
 use super::collapse::Collapse;
 use super::course::Course;
 use super::descent::Optimizer;
 use super::job::{Embedded, Job, Next, Settings, Snapshot};
 use super::shorter::Shorter;
+use super::{EmbeddingError, coarse};
 use crate::progress::Progress;
 
 /// From where to where moving nodes brings the progress of the whole.
@@ -37,6 +37,9 @@ pub fn optimise(
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<Embedded, EmbeddingError> {
+    if let Some(done) = coarse::coarse_to_fine(job, progress, watch)? {
+        return Ok(done);
+    }
     progress.report("Embedding the layout", 0.0);
     let (mut optimizer, mut course) = match Optimizer::new(job, progress) {
         Ok(optimizer) => {

@@ -20,7 +20,7 @@ use crate::param::{
     gradients,
 };
 use crate::progress::Progress;
-use crate::solve::SpdSymbolic;
+use crate::solve::{SolveError, SpdSymbolic};
 use crate::surface::PrincipalCurvature;
 
 /// Deviation, in quarter turns, up to which a principal direction fully guides the field, and from which on not at all:
@@ -77,8 +77,10 @@ pub(super) enum Start<'s> {
 
 /// The most that directions may count in a triangle, as a multiple of the anisotropy: angles suffer where it is more.
 const FIRMEST: f64 = 4.0;
-/// Up to how many folds of the first guess of a map are worth removing one by one.
+/// Up to how many folds of the first guess of a map are worth removing one by one: after a step, to which there is an
+/// alternative, and at first.
 const FEW: usize = 50;
+const FEW_AT_FIRST: usize = 200;
 /// How often a first guess is fitted again with more weight on the triangles that fold, and by how much more.
 const REFITS: usize = 2;
 const FIRMER: f64 = 9.0;
@@ -115,20 +117,19 @@ impl Solver<'_> {
         let mesh = &net.mesh;
         let angle = self.angles(&net, &metric, previous, progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
-        let lengths = if self.settings.sizing {
-            let system = SizingSystem::new(mesh, &metric, self.sizes.take())?;
-            self.sizes = Some(system.symbolic());
-            let rest = rest_turns(mesh, &metric, &angle, &net.jump);
-            system.lengths(mesh, &metric, &rest)?
-        } else {
-            Vec::new()
-        };
-        let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let features = alignment::features(&net, &metric, &field.angle, self.sharp);
         let pulled = if self.features == Features::Pulled { &features[..] } else { &[] };
-        let system = self.build(&net, &field, &nodes, &features)?;
+        let (sizing, sizes) = (self.settings.sizing, self.sizes.take());
+        let (lengths, built) = rayon::join(
+            || if sizing { lengths((mesh, &metric), &angle, &net.jump, sizes) } else { Ok((Vec::new(), sizes)) },
+            || self.build(&net, &field, &nodes, &features),
+        );
+        let (lengths, sizes) = lengths?;
+        self.sizes = sizes;
+        let mut system = built?;
+        let objective = Objective { anisotropy: self.settings.anisotropy, lengths, stiffness: Vec::new() };
         progress.check()?;
         let solution = match aim {
             Aim::LeastSquares => Ok(system.solve(&metric, &field, &objective, progress)?),
@@ -136,9 +137,10 @@ impl Solver<'_> {
                 let firmness = &firmness;
                 let setting =
                     Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness, pulled };
-                setting.injective(system, shape, start, steps, progress)?
+                setting.injective(&mut system, shape, start, steps, progress)?
             }
         };
+        self.seamless = Some(system);
         Ok(solution.map(|solution| State { net, metric, field, objective, firmness, solution }))
     }
 
@@ -149,7 +151,7 @@ impl Solver<'_> {
         field: &CrossField,
         nodes: &[VertexId],
         features: &[(HalfedgeId, u8)],
-    ) -> Result<&mut SeamlessSystem, EmbeddingError> {
+    ) -> Result<SeamlessSystem, EmbeddingError> {
         let demanded = alignment::demanded(net, self.roads);
         let mut features: Vec<Relation> = match self.features {
             Features::Pulled => Vec::new(),
@@ -164,7 +166,7 @@ impl Solver<'_> {
                 None => SeamlessSystem::new(&net.mesh, field, nodes, &relations).map(|new| system = Some(new)),
             };
             match (built, system) {
-                (Ok(()), Some(done)) => return Ok(self.seamless.insert(done)),
+                (Ok(()), Some(done)) => return Ok(done),
                 (Err(ParamError::Conflict { relation, .. }), kept) if !(spacing.is_empty() && features.is_empty()) => {
                     tracing::debug!(relation, demanded = demanded.len(), "a wish contradicts the layout");
                     match relation.checked_sub(demanded.len() + spacing.len()) {
@@ -263,9 +265,11 @@ impl Setting<'_> {
             }
         };
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
-        let (free, folded) = self.fitted(system, &wanted, progress)?;
+        let newton = system.newton()?;
+        let few = if matches!(start, Start::Map(_)) { FEW_AT_FIRST } else { FEW };
+        let (free, folded) = self.fitted(system, &wanted, few, progress)?;
         let mut found = system.injective(&energy, free.clone());
-        if found.is_none() && folded.len() <= FEW {
+        if found.is_none() && folded.len() <= few {
             let quarters = net.quarters();
             let triangles = system.triangles(&net.mesh, metric, field, objective)?;
             let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
@@ -276,7 +280,7 @@ impl Setting<'_> {
             tracing::debug!(folds = folded.len(), "the first guess folds");
             return Ok(Err(Folded(folded)));
         };
-        system.descend(&system.newton()?, &energy, &mut at, steps, progress)?;
+        system.descend(&newton, &energy, &mut at, steps, progress)?;
         let Injective { map, free, energy } = at;
         Ok(Ok(Solution { map, free, energy }))
     }
@@ -286,6 +290,7 @@ impl Setting<'_> {
         &self,
         system: &mut SeamlessSystem,
         wanted: &[[f64; 4]],
+        few: usize,
         progress: &Progress,
     ) -> Result<(Vec<f64>, Vec<FaceId>), EmbeddingError> {
         let Self { net, metric, field, .. } = *self;
@@ -294,7 +299,7 @@ impl Setting<'_> {
         let mut weight = vec![1.0; wanted.len()];
         for _ in 0..REFITS {
             progress.check()?;
-            if folded.is_empty() || folded.len() > FEW {
+            if folded.is_empty() || folded.len() > few {
                 break;
             }
             let mut list = vec![false; wanted.len()];
@@ -310,6 +315,18 @@ impl Setting<'_> {
         }
         Ok((free, folded))
     }
+}
+
+/// The lengths that the field asks for, and the analysis of the system that they solve.
+fn lengths(
+    (mesh, metric): (&TriMesh, &Metric),
+    angle: &[f64],
+    jump: &[i32],
+    symbolic: Option<SpdSymbolic>,
+) -> Result<(Vec<[f64; 2]>, Option<SpdSymbolic>), SolveError> {
+    let system = SizingSystem::new(mesh, metric, symbolic)?;
+    let rest = rest_turns(mesh, metric, angle, jump);
+    Ok((system.lengths(mesh, metric, &rest)?, Some(system.symbolic())))
 }
 
 /// By what factor the anisotropy counts in each triangle: 0 where the surface bends alike in all directions, 1

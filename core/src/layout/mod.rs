@@ -2,12 +2,15 @@
 //!
 //! Data flows [`structure`] → [`embed`] (nodes and arcs on the surface) → [`patch`] (each patch mapped to a
 //! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. [`collapse`] deletes chords of a
-//! layout, [`redraw`] draws what is left. The room knows arrangements, not how their curves came about.
+//! layout, [`redraw`] draws what is left, [`carry`] draws a layout on another mesh of the surface. The room knows arrangements, not how their curves came about.
 
+mod carry;
 mod collapse;
 mod disc;
+mod dual;
 mod embed;
 mod file;
+mod matching;
 mod patch;
 mod piece;
 mod redraw;
@@ -15,8 +18,10 @@ mod structure;
 #[cfg(test)]
 mod tests;
 
+pub use carry::carry;
 pub use collapse::{CollapseError, Collapsed};
 pub(crate) use disc::flipped;
+pub use dual::Line;
 pub use embed::{EmbedError, Embedding, embed};
 pub use file::{
     ArcEnd, DrawError, Drawing, DrawnCorner, DrawnRegion, FileArc, FileNode, LayoutFile, LayoutFileError, Part,

@@ -1,21 +1,17 @@
 //! The drawing of a layout without some of its chords.
 //!
-//! A drawn layout is turned into its dual: every patch is mapped onto a round disc, and the middles of its opposite sides
-//! are joined there by straight lines, one for each chord that is kept. These lines are an arrangement of curves on the
-//! surface, and the layout dual to it is drawn as any woven one ([`super::embed`]): a merged node lies in the region in
-//! which those it was made of lay, every other node stays where it was.
+//! The layout dual to the curves through the middles of the chords that are kept ([`Dual`]) is drawn as any woven one
+//! ([`super::embed`]): a merged node lies in the region in which those it was made of lay, every other node stays where
+//! it was.
 
-use glam::DVec3;
-use rayon::prelude::*;
 use thiserror::Error;
 
 use super::collapse::{CollapseError, Collapsed};
-use super::embed::{EmbedError, Embedding, embed, lengths, round_map};
-use super::patch::{Lookup, border_sides, flood};
-use super::piece::Piece;
+use super::dual::Dual;
+use super::embed::{EmbedError, Embedding, embed};
 use super::structure::{LayoutError, QuadLayout};
-use crate::dual::{Arrangement, ArrangementError, Mark, NoRoute, RefinedMesh};
-use crate::mesh::{TriMesh, TriMeshError, VertexId};
+use crate::dual::{ArrangementError, NoRoute};
+use crate::mesh::{TriMeshError, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::solve::SolveError;
 
@@ -100,19 +96,8 @@ pub fn redraw(
     progress: &Progress,
 ) -> Result<Redrawn, RedrawError> {
     let collapsed = layout.without(gone)?;
-    let drawing = with_inner_vertices(drawing)?;
-    let middles: Vec<u32> = drawing.arcs.iter().map(|path| middle(&drawing.mesh.positions, path)).collect();
-    let lookup = Lookup::new(&drawing);
-    let parts: Vec<DualPatch> = (0..layout.patches.len())
-        .into_par_iter()
-        .map(|p| {
-            progress.check()?;
-            DualPatch::build(layout, &drawing, &lookup, &middles, gone, p)
-        })
-        .collect::<Result<_, RedrawError>>()?;
-    let (refined, base_face) = assemble(&drawing, &parts)?;
-    let arrangement = Arrangement::of_drawn(refined, n_surface)?;
-    let dual = QuadLayout::dual(&arrangement, &[], euler(&collapsed.layout))?;
+    let Dual { arrangement, base_face, drawing, middles } = Dual::new(layout, drawing, gone, n_surface, progress)?;
+    let dual = QuadLayout::dual(&arrangement, &[], collapsed.layout.euler())?;
     let region = |v: u32| arrangement.region_left_of(arrangement.refined.any_outgoing(v));
     let nodes: Vec<u32> = drawing.nodes.iter().map(|&v| region(v)).collect();
     let preferred = places(layout, &drawing, &dual, &nodes, stays);
@@ -131,10 +116,6 @@ pub fn redraw(
         }
     }
     Ok(Redrawn { layout: dual, embedding, nodes, arcs, chords })
-}
-
-fn euler(layout: &QuadLayout) -> i64 {
-    layout.nodes.len() as i64 - layout.arcs.len() as i64 + layout.patches.len() as i64
 }
 
 /// Checks that the layout dual to the drawn curves has the nodes that the deletion of chords has left.
@@ -171,98 +152,4 @@ fn places(
         chosen.map(|n| VertexId(drawing.nodes[n]))
     };
     made_of.iter().enumerate().map(place).collect()
-}
-
-/// A drawing with the same parts, in which every arc has an inner vertex.
-fn with_inner_vertices(drawing: &Embedding) -> Result<Embedding, RedrawError> {
-    let mut mesh = RefinedMesh::new(&drawing.mesh.to_mesh()?);
-    for h in 0..3 * mesh.n_faces() as u32 {
-        mesh.set_mark(h, drawing.mesh.mark(h));
-    }
-    let mut arcs = drawing.arcs.clone();
-    for (arc, path) in arcs.iter_mut().enumerate() {
-        if let &[a, b] = path.as_slice() {
-            let on_arc = |h: &u32| mesh.mark(*h) == Mark::Arc(arc as u32);
-            let leaving = mesh.outgoing(a).into_iter().find(|h| mesh.target(*h) == b && on_arc(h));
-            let arriving = || mesh.outgoing(b).into_iter().find(|h| mesh.target(*h) == a && on_arc(h));
-            let h = leaving.or_else(arriving).ok_or(RedrawError::Arc { arc })?;
-            path.insert(1, mesh.split_edge(h, 0.5));
-        }
-    }
-    let base_face = (0..mesh.n_faces() as u32).map(|f| drawing.base_face[mesh.base_face(f) as usize]).collect();
-    let arc_parameters = arcs.iter().map(|path| lengths(&mesh.positions, path)).collect();
-    Ok(Embedding { mesh, base_face, nodes: drawing.nodes.clone(), arcs, arc_parameters, seeds: drawing.seeds.clone() })
-}
-
-/// The inner vertex of a path nearest to its middle.
-fn middle(positions: &[DVec3], path: &[u32]) -> u32 {
-    let along = lengths(positions, path);
-    let half = 0.5 * along[along.len() - 1];
-    let off = |i: usize| (along[i] - half).abs();
-    let best = (1..path.len() - 1).min_by(|&i, &j| off(i).total_cmp(&off(j)));
-    path[best.unwrap_or(0)]
-}
-
-/// A patch with the dual curves through it.
-struct DualPatch {
-    mesh: RefinedMesh,
-    /// Vertex of the drawing for the first vertices; those after are new.
-    whole: Vec<u32>,
-    /// Faces of the drawing that the patch consists of.
-    faces: Vec<u32>,
-}
-
-impl DualPatch {
-    fn build(
-        layout: &QuadLayout,
-        drawing: &Embedding,
-        lookup: &Lookup,
-        middles: &[u32],
-        gone: &[bool],
-        p: usize,
-    ) -> Result<Self, RedrawError> {
-        let on_arc = |h: u32| drawing.mesh.mark(h) != Mark::Free;
-        let faces = flood(&drawing.mesh, drawing.seeds[p], on_arc);
-        let piece = Piece::cut_out(&drawing.mesh, &faces, on_arc)?;
-        let sides = border_sides(layout, lookup, &piece, p).ok_or(RedrawError::Patch { patch: p })?;
-        let mut mesh = RefinedMesh::new(&piece.mesh);
-        mesh.uv = round_map(&piece.mesh, &sides).map_err(|source| RedrawError::Solve { patch: p, source })?;
-        for i in 0..2 {
-            let ends = [i, i + 2].map(|k| layout.patches[p].sides[k].0);
-            let chord = layout.arcs[ends[0] as usize].chord;
-            if gone[chord as usize] {
-                continue;
-            }
-            let at = |k: usize| {
-                let arc = layout.patches[p].sides[k].0 as usize;
-                sides[k].iter().copied().find(|&v| piece.whole[v as usize] == middles[arc])
-            };
-            let (Some(from), Some(to)) = (at(i), at(i + 2)) else { return Err(RedrawError::Patch { patch: p }) };
-            mesh.draw((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
-                .map_err(|source| RedrawError::Draw { patch: p, source })?;
-        }
-        Ok(Self { mesh, whole: piece.whole, faces })
-    }
-}
-
-/// Glues the patches together again, with only the dual curves marked; also tells the triangle of the surface that each
-/// face lies in.
-fn assemble(drawing: &Embedding, parts: &[DualPatch]) -> Result<(RefinedMesh, Vec<u32>), RedrawError> {
-    let mut positions = drawing.mesh.positions.clone();
-    let (mut faces, mut base_face, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-    for part in parts {
-        let first_new = positions.len() as u32 - part.whole.len() as u32;
-        let global = |v: u32| part.whole.get(v as usize).copied().unwrap_or(first_new + v);
-        positions.extend(&part.mesh.positions[part.whole.len()..]);
-        for f in 0..part.mesh.n_faces() as u32 {
-            faces.push(part.mesh.corners(f).map(global));
-            base_face.push(drawing.base_face[part.faces[part.mesh.base_face(f) as usize] as usize]);
-            marks.extend((3 * f..3 * f + 3).map(|h| part.mesh.mark(h)));
-        }
-    }
-    let mut mesh = RefinedMesh::new(&TriMesh::from_faces(positions, &faces)?);
-    for (h, mark) in (0..).zip(marks).filter(|(_, mark)| *mark != Mark::Free) {
-        mesh.set_mark(h, mark);
-    }
-    Ok((mesh, base_face))
 }

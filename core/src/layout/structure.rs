@@ -198,12 +198,17 @@ impl QuadLayout {
                 return Err(LayoutError::Valence { node, valence: n.valence, corners });
             }
         }
-        let found = self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64;
+        let found = self.euler();
         if found != euler {
             let (nodes, arcs, patches) = (self.nodes.len(), self.arcs.len(), self.patches.len());
             return Err(LayoutError::Euler { nodes, arcs, patches, found, expected: euler });
         }
         Ok(())
+    }
+
+    /// Its Euler characteristic, that of its surface.
+    pub fn euler(&self) -> i64 {
+        self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64
     }
 
     /// The least numbers of quads across the chords with which a refinement is a mesh: no arc is cut short to join a node

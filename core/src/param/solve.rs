@@ -18,7 +18,9 @@ use super::{ParamError, expect_length};
 use crate::field::{CrossField, Metric};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
-use crate::solve::{Constraint, EliminationError, Reduction, SparseHermitian, SpdFactor, SpdSymbolic, eliminate};
+use crate::solve::{
+    Constraint, EliminationError, Reduction, SolveError, SparseHermitian, SpdFactor, SpdSymbolic, eliminate,
+};
 
 /// The system of seamless maps of one topology.
 #[derive(Debug, Clone)]
@@ -214,6 +216,16 @@ impl SeamlessSystem {
     /// What the relations leave of what the seams leave.
     pub(super) fn ties(&self) -> &Reduction {
         &self.tied.ties
+    }
+
+    /// The analysis of the pattern of this system's matrices.
+    pub(super) fn analysed(&self) -> Result<SpdSymbolic, SolveError> {
+        self.symbolic.clone().map_or_else(|| SpdSymbolic::new(&self.tied.fold.zero), Ok)
+    }
+
+    /// Keeps an analysis for the matrices to come.
+    pub(super) fn keep_analysis(&mut self, symbolic: SpdSymbolic) {
+        self.symbolic = Some(symbolic);
     }
 
     /// Factors a matrix of this system; the first time its pattern is analysed.

@@ -97,14 +97,14 @@ impl Guide {
         Self { segments, closed, reach: REACH * mean_edge(mesh, line) }
     }
 
-    /// The image on the proxy of a curve of the original.
-    fn image(proxy: &Proxy, original: &TriMesh, curve: &SurfaceCurve) -> Self {
+    /// The image on the proxy of a line over the original.
+    fn image(proxy: &Proxy, original: &TriMesh, line: impl Iterator<Item = SurfacePoint>, closed: bool) -> Self {
         let mesh = proxy.mesh();
-        let image = |i: usize| {
-            let at = proxy.to_proxy(original, curve.surface_point(original, i));
+        let image = |point: SurfacePoint| {
+            let at = proxy.to_proxy(original, point);
             (at.position(mesh), at.face)
         };
-        let all: Vec<(DVec3, FaceId)> = (0..curve.crossings.len()).map(image).collect();
+        let all: Vec<(DVec3, FaceId)> = line.map(image).collect();
         let edge = mean_edge(mesh, &all);
         let mut points: Vec<(DVec3, FaceId)> = Vec::new();
         for &p in &all {
@@ -114,7 +114,7 @@ impl Guide {
         }
         let (&first, &end) = (&all[0], &all[all.len() - 1]);
         let near = |p: DVec3, q: DVec3| p.distance(q) < APART * edge;
-        if curve.closed {
+        if closed {
             while points.len() > 3 && points.last().is_some_and(|last| near(last.0, first.0)) {
                 points.pop();
             }
@@ -131,8 +131,8 @@ impl Guide {
             let up = mesh.face_normal(face) + mesh.face_normal(other);
             Segment { from, to, left: up.cross(to - from).normalize_or_zero(), face }
         };
-        let count = if curve.closed { n } else { n - 1 };
-        Self { segments: (0..count).map(segment).collect(), closed: curve.closed, reach: REACH * edge }
+        let count = if closed { n } else { n - 1 };
+        Self { segments: (0..count).map(segment).collect(), closed, reach: REACH * edge }
     }
 
     /// The segment after or before another.
@@ -250,7 +250,31 @@ impl Proxy {
     /// A curve that is not one on the original, or one smaller than the triangles of the proxy.
     pub fn curve_to_proxy(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
         curve.check(original)?;
-        let guide = Guide::image(self, original, curve);
+        let points = (0..curve.crossings.len()).map(|i| curve.surface_point(original, i));
+        let guide = Guide::image(self, original, points, curve.closed);
+        let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide: &guide };
+        walker.follow(self, |point| point.face)
+    }
+
+    /// As [`Self::curve_to_proxy`] for a line over the original, as in [`Self::line_to_original`].
+    ///
+    /// # Errors
+    ///
+    /// A line smaller than the triangles of the proxy.
+    pub fn line_to_proxy(
+        &self,
+        original: &TriMesh,
+        line: &[(DVec3, FaceId)],
+        closed: bool,
+    ) -> Result<SurfaceCurve, CarryError> {
+        if line.len() < 2 {
+            return Err(CarryError::Lost);
+        }
+        let points = line.iter().map(|&(p, face)| {
+            let corners = original.face_vertices(face).map(|v| original.position(v));
+            SurfacePoint { face, weights: nearest_in_triangle(p, &corners) }
+        });
+        let guide = Guide::image(self, original, points, closed);
         let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide: &guide };
         walker.follow(self, |point| point.face)
     }

@@ -99,12 +99,18 @@ impl SeamlessSystem {
         Ok(self.factor(&matrix)?.solve(&matrix, &rhs)?)
     }
 
-    /// Prepares Newton's method for the present relations.
+    /// Prepares Newton's method for the present relations, and the fit that it starts from.
     ///
     /// # Errors
     ///
     /// [`ParamError::Solve`].
-    pub fn newton(&self) -> Result<NewtonSystem, ParamError> {
+    pub fn newton(&mut self) -> Result<NewtonSystem, ParamError> {
+        let (fit, newton) = rayon::join(|| self.analysed(), || self.newton_system());
+        self.keep_analysis(fit?);
+        Ok(newton?)
+    }
+
+    fn newton_system(&self) -> Result<NewtonSystem, SolveError> {
         let shares = Scatter::of_whole_triangles(self.cut(), self.seams());
         let fold = Scatter::of_matrix(&shares.zero, self.ties());
         let symbolic = SpdSymbolic::new(&fold.zero)?;

@@ -1,0 +1,221 @@
+//! From coarse to fine: a large mesh has its layout optimised on a small one first.
+//!
+//! Where nodes want to be does not depend on triangles much smaller than patches, but all that it takes to find out does.
+//! So the layout is carried to a proxy of the mesh, optimised there, and carried back; what is left to do on the mesh
+//! itself is a first map and a few steps that nodes are off.
+
+use std::collections::VecDeque;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::EmbeddingError;
+use super::course::Course;
+use super::descent::Optimizer;
+use super::injective::Drawn;
+use super::job::{Embedded, Job, Next, Settings, Snapshot, Surface};
+use super::optimise::optimise;
+use crate::layout::{Embedding, Line, PatchMap, QuadLayout, carry};
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::progress::Progress;
+use crate::proxy::Proxy;
+use crate::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, nearest_in_triangle};
+
+/// Triangles of the small mesh: so many in all, or for each patch where that is more.
+const COARSE: usize = 6000;
+const PER_PATCH: usize = 60;
+/// How many times as many triangles a mesh must have for this to be worth while.
+const WORTH: usize = 2;
+/// By what factor a mesh that is too coarse for the layout is made finer.
+const FINER: usize = 2;
+/// Steps of the nodes on the mesh itself.
+const FINE_STEPS: usize = 1;
+
+/// Embeds a layout by way of a smaller mesh. `None` if that is not worth while or does not lead anywhere.
+///
+/// # Errors
+///
+/// [`EmbeddingError::Cancelled`].
+pub(super) fn coarse_to_fine(
+    job: &Job<'_>,
+    progress: &Progress,
+    watch: &mut dyn FnMut(&Snapshot) -> Next,
+) -> Result<Option<Embedded>, EmbeddingError> {
+    let Settings { collapse, simplify, integer, .. } = job.settings;
+    let usual = collapse.is_none() && !simplify && integer.is_none();
+    let pinned = job.pinned_nodes.iter().chain(job.pinned_arcs).any(|&p| p);
+    let patches = job.layout.patches.len();
+    if !usual || pinned || patches == 0 {
+        return Ok(None);
+    }
+    let mut target = COARSE.max(PER_PATCH * patches);
+    while job.surface.mesh.n_faces() > WORTH * target {
+        let found = by_way_of_proxy(job, target, progress, watch);
+        progress.check()?;
+        match found {
+            Ok(Some(done)) => return Ok(Some(done)),
+            Ok(None) => tracing::debug!(target, "the layout does not fit on the proxy"),
+            Err(error) => tracing::debug!(target, %error, "not embedded by way of a proxy"),
+        }
+        target *= FINER;
+    }
+    Ok(None)
+}
+
+/// As [`coarse_to_fine`]; `None` if the layout cannot be carried to the proxy or back.
+fn by_way_of_proxy(
+    job: &Job<'_>,
+    target: usize,
+    progress: &Progress,
+    watch: &mut dyn FnMut(&Snapshot) -> Next,
+) -> Result<Option<Embedded>, EmbeddingError> {
+    let Job { surface, layout, .. } = *job;
+    progress.report("Simplifying the mesh", 0.0);
+    let proxy = Proxy::new(surface.mesh, surface.sharp, target, progress)?;
+    let levels = Levels { fine: surface.mesh, proxy: &proxy };
+    let Some(drawing) = levels.down(job, progress)? else { return Ok(None) };
+    let mesh = proxy.mesh();
+    let index = SurfaceIndex::new(mesh);
+    let curvature: Vec<PrincipalCurvature> =
+        mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
+    let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
+    let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
+    let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
+    let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
+    let settings = Settings { steps: FINE_STEPS.min(job.settings.steps), ..job.settings };
+    let fine = Job { drawing: &drawing, settings, ..*job };
+    let drawn = Drawn::new(layout, &drawing, progress)?;
+    let guess = levels.guess(&drawn, &coarse.maps);
+    let start = match Optimizer::from_drawn(&fine, &drawn, &guess, progress)? {
+        Ok(start) => Ok(start),
+        Err(_) => Optimizer::from_drawn(&fine, &drawn, &drawn.uv, progress)?,
+    };
+    let mut course = Course::going_on(&fine, &coarse.report, watch);
+    let mut done = course.without_folds(&fine, Ok(start), progress)?;
+    course.enter(&mut done.report);
+    Ok(Some(done))
+}
+
+/// A snapshot on the proxy with its points on the surface.
+fn on_surface(snapshot: &Snapshot, index: &SurfaceIndex, mesh: &TriMesh) -> Snapshot {
+    let onto = |p: &DVec3| index.nearest(*p).position(mesh);
+    let line = |line: &Vec<DVec3>| line.iter().map(onto).collect();
+    Snapshot {
+        nodes: snapshot.nodes.iter().map(onto).collect(),
+        arcs: snapshot.arcs.iter().map(|arc| arc.as_ref().map(line)).collect(),
+        ..*snapshot
+    }
+}
+
+/// A mesh and its proxy.
+struct Levels<'a> {
+    fine: &'a TriMesh,
+    proxy: &'a Proxy,
+}
+
+impl Levels<'_> {
+    /// The drawing of the job on the proxy.
+    fn down(&self, job: &Job<'_>, progress: &Progress) -> Result<Option<Embedding>, EmbeddingError> {
+        let drawn = (job.layout, job.drawing, self.fine.n_vertices());
+        let place = |n: usize| {
+            let at = point(self.fine, job.drawing, job.drawing.nodes[n]);
+            Some(self.proxy.to_proxy(self.fine, at).nearest_vertex(self.proxy.mesh()))
+        };
+        let carried = |line: &Line| {
+            let found = self.proxy.line_to_proxy(self.fine, &line.points, line.closed);
+            found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be carried to the proxy")).ok()
+        };
+        Ok(carry(drawn, self.proxy.mesh(), carried, place, progress)?)
+    }
+
+    /// A drawing on the proxy, drawn on the mesh.
+    fn up(
+        &self,
+        layout: &QuadLayout,
+        drawing: &Embedding,
+        progress: &Progress,
+    ) -> Result<Option<Embedding>, EmbeddingError> {
+        let place = |n: usize| Some(self.original_vertex(point(self.proxy.mesh(), drawing, drawing.nodes[n])));
+        let carried = |line: &Line| {
+            let found = self.proxy.line_to_original(self.fine, &line.points, line.closed);
+            found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be carried back")).ok()
+        };
+        Ok(carry((layout, drawing, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
+    }
+
+    /// The map of the proxy on a drawing on the mesh: coordinates of the corners of each triangle up to a translation.
+    fn guess(&self, drawn: &Drawn, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
+        let mut pieces: Vec<Vec<Affine>> = vec![Vec::new(); self.proxy.mesh().n_faces()];
+        for (p, map) in (0..).zip(maps) {
+            for f in map.mesh.faces() {
+                pieces[map.base_face[f.index()] as usize].extend(Affine::of(map, f, p));
+            }
+        }
+        let mesh = &drawn.mesh;
+        let found = |f: FaceId| {
+            let center = mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>() / 3.0;
+            let face = FaceId(drawn.base_face[f.index()]);
+            let corners = self.fine.face_vertices(face).map(|v| self.fine.position(v));
+            let at = SurfacePoint { face, weights: nearest_in_triangle(center, &corners) };
+            let there = self.proxy.to_proxy(self.fine, at);
+            let at = there.position(self.proxy.mesh());
+            let own = pieces[there.face.index()].iter().filter(|a| a.patch == drawn.patch[f.index()]);
+            own.min_by(|a, b| a.center.distance_squared(at).total_cmp(&b.center.distance_squared(at))).copied()
+        };
+        let mut maps: Vec<Option<Affine>> = mesh.faces().collect::<Vec<_>>().into_par_iter().map(found).collect();
+        // Beside an arc that runs elsewhere on the proxy it is the map next to it in the patch.
+        let mut queue: VecDeque<FaceId> = mesh.faces().filter(|f| maps[f.index()].is_some()).collect();
+        while let Some(f) = queue.pop_front() {
+            for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|h| mesh.face(h)) {
+                if maps[g.index()].is_none() && drawn.patch[g.index()] == drawn.patch[f.index()] {
+                    maps[g.index()] = maps[f.index()];
+                    queue.push_back(g);
+                }
+            }
+        }
+        let uv = |f: FaceId| match &maps[f.index()] {
+            Some(map) => mesh.face_vertices(f).map(|v| map.uv(mesh.position(v))),
+            None => drawn.uv[f.index()],
+        };
+        mesh.faces().map(uv).collect()
+    }
+
+    fn original_vertex(&self, at: SurfacePoint) -> VertexId {
+        self.proxy.to_original(self.fine, at).nearest_vertex(self.fine)
+    }
+}
+
+/// The map of a triangle of the proxy.
+#[derive(Debug, Clone, Copy)]
+struct Affine {
+    patch: u32,
+    center: DVec3,
+    /// The gradients of both coordinates.
+    gradients: [DVec3; 2],
+}
+
+impl Affine {
+    /// That of a triangle of a patch; `None` if the triangle is none.
+    fn of(map: &PatchMap, f: FaceId, patch: u32) -> Option<Self> {
+        let corners = map.mesh.face_vertices(f);
+        let [a, b, c] = corners.map(|v| map.mesh.position(v));
+        let [ua, ub, uc] = corners.map(|v| map.uv[v.index()]);
+        let area = (b - a).cross(c - a);
+        let hats = [c - b, a - c, b - a].map(|side| area.cross(side) / area.length_squared());
+        let gradient = |k: usize| hats[0] * ua[k] + hats[1] * ub[k] + hats[2] * uc[k];
+        let gradients = [gradient(0), gradient(1)];
+        let finite = gradients.iter().all(|g| g.is_finite());
+        finite.then_some(Self { patch, center: (a + b + c) / 3.0, gradients })
+    }
+
+    fn uv(&self, p: DVec3) -> DVec2 {
+        DVec2::new(self.gradients[0].dot(p), self.gradients[1].dot(p))
+    }
+}
+
+/// Where a vertex of a drawing lies on the mesh that it refines.
+fn point(mesh: &TriMesh, drawing: &Embedding, v: u32) -> SurfacePoint {
+    let face = FaceId(drawing.base_face[drawing.mesh.any_outgoing(v) as usize / 3]);
+    let corners = mesh.face_vertices(face).map(|v| mesh.position(v));
+    SurfacePoint { face, weights: nearest_in_triangle(drawing.mesh.positions[v as usize], &corners) }
+}

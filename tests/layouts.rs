@@ -6,13 +6,16 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 use plait_core::dual::{Mark, RefinedMesh};
-use plait_core::embed::{Embedded, Headings, Job, Net, Next, Optimizer, Settings, Surface, headings, optimise};
+use plait_core::embed::{
+    Embedded, EmbeddingError, Headings, Job, Net, Next, Optimizer, Settings, Snapshot, Surface, headings, optimise,
+};
 use plait_core::field::{Metric, indices};
-use plait_core::layout::{Arc, Embedding, Node, Patch, QuadLayout, redraw};
-use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh};
+use plait_core::layout::{Arc, Embedding, Line, Node, Patch, QuadLayout, carry, map_patches, redraw};
+use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
+use plait_core::proxy::Proxy;
 use plait_core::quad::{refine, whole_counts};
-use plait_core::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
+use plait_core::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
 use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
 use support::{meshes, root};
 
@@ -200,6 +203,11 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
 /// An icosahedron on a sphere, every triangle in three patches around its middle, on a mesh of 1920 triangles: 12 nodes of
 /// valence 5 among 20 of valence 3.
 fn icosahedron() -> (Stage, QuadLayout, Embedding) {
+    icosahedron_of(2)
+}
+
+/// The same on a mesh of 120 triangles that are split in four so many times.
+fn icosahedron_of(splits: u32) -> (Stage, QuadLayout, Embedding) {
     let g = 0.5 * (1.0 + 5f64.sqrt());
     let mut points: Vec<DVec3> = Vec::new();
     for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
@@ -253,7 +261,7 @@ fn icosahedron() -> (Stage, QuadLayout, Embedding) {
     }
     let nodes: Vec<Node> = nodes.into_iter().map(|valence| Node { valence, boundary: false }).collect();
     let mut paths: Vec<Vec<u32>> = arcs.iter().map(|a| a.nodes.to_vec()).collect();
-    for _ in 0..2 {
+    for _ in 0..splits {
         let mut middle: HashMap<[u32; 2], u32> = HashMap::new();
         let mut between = |a: u32, b: u32| {
             *middle.entry([a.min(b), a.max(b)]).or_insert_with(|| {
@@ -286,10 +294,94 @@ fn icosahedron() -> (Stage, QuadLayout, Embedding) {
         nodes: (0..nodes.len() as u32).collect(),
         arc_parameters: paths.iter().map(|p| (0..p.len()).map(|i| i as f64).collect()).collect(),
         arcs: paths,
-        // Every patch was two triangles, each of them sixteen now.
-        seeds: (0..patches.len() as u32).map(|p| 32 * p).collect(),
+        // Every patch was two triangles.
+        seeds: (0..patches.len() as u32).map(|p| (2 * p) << (2 * splits)).collect(),
     };
     (Stage::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), drawing)
+}
+
+/// That every arc of a drawing runs from its first node to its second along edges marked as its own.
+fn is_drawn(layout: &QuadLayout, drawing: &Embedding) {
+    for (a, (arc, path)) in (0..).zip(layout.arcs.iter().zip(&drawing.arcs)) {
+        let ends = [path[0], path[path.len() - 1]];
+        assert_eq!(ends, arc.nodes.map(|n| drawing.nodes[n as usize]), "arc {a}");
+        for w in path.windows(2) {
+            let h = drawing.mesh.find(w[0], w[1]).unwrap();
+            assert_eq!(drawing.mesh.mark(h), Mark::Arc(a));
+        }
+    }
+    assert_eq!(drawing.seeds.len(), layout.patches.len());
+    assert_eq!(map_patches(layout, drawing, &Progress::new()).unwrap().len(), layout.patches.len());
+}
+
+#[test]
+fn a_drawing_is_carried_to_a_proxy_and_back() {
+    let (stage, layout, drawing) = icosahedron_of(4);
+    let proxy = Proxy::new(&stage.mesh, &stage.sharp, 6000, &Progress::new()).unwrap();
+    let at = |v: VertexId| SurfacePoint {
+        face: stage.mesh.face(stage.mesh.vertex_halfedge(v)),
+        weights: [0, 1, 2].map(|i| {
+            let corner = stage.mesh.face_vertices(stage.mesh.face(stage.mesh.vertex_halfedge(v)))[i];
+            if corner == v { 1.0 } else { 0.0 }
+        }),
+    };
+    // Nodes of the drawing are vertices of the mesh.
+    let to = |n: usize| Some(proxy.to_proxy(&stage.mesh, at(VertexId(drawing.nodes[n]))).nearest_vertex(proxy.mesh()));
+    let carried = |line: &Line| proxy.line_to_proxy(&stage.mesh, &line.points, line.closed).ok();
+    let own = (&layout, &drawing, stage.mesh.n_vertices());
+    let coarse = carry(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
+    is_drawn(&layout, &coarse);
+    let carried = |line: &Line| proxy.line_to_original(&stage.mesh, &line.points, line.closed).ok();
+    let own = (&layout, &coarse, proxy.mesh().n_vertices());
+    let back = carry(own, &stage.mesh, carried, |n| Some(VertexId(drawing.nodes[n])), &Progress::new());
+    let back = back.unwrap().unwrap();
+    is_drawn(&layout, &back);
+    // Every part has kept its number: nodes lie where they lay, and arcs near.
+    assert_eq!(back.nodes, drawing.nodes);
+    let middle = |d: &Embedding, a: usize| d.mesh.positions[d.arcs[a][d.arcs[a].len() / 2] as usize];
+    for a in 0..layout.arcs.len() {
+        let off = middle(&back, a).distance(middle(&drawing, a));
+        assert!(off < 0.06, "arc {a} of a sphere of radius 0.3 is {off} off");
+    }
+}
+
+#[test]
+fn a_large_mesh_is_embedded_by_way_of_a_proxy() {
+    let (stage, layout, drawing) = icosahedron_of(4);
+    let headings = headings(&layout);
+    let job = stage.job(&layout, &drawing, &headings);
+    let progress = Progress::new();
+    let mut seen = 0;
+    let mut on_surface = |s: &Snapshot| {
+        let points = s.nodes.iter().chain(s.arcs.iter().flatten().flatten());
+        assert!(points.clone().count() > 0);
+        for p in points {
+            assert!(stage.index.nearest(*p).position(&stage.mesh).distance(*p) < 1e-9);
+        }
+        seen += 1;
+        Next::Continue
+    };
+    let done = optimise(&job, &progress, &mut on_surface).unwrap();
+    assert!(progress.stage_times().iter().any(|s| s.stage == "Simplifying the mesh"));
+    assert!(seen > 1);
+    assert_eq!(done.layout, layout);
+    assert!(done.report.folds.is_empty());
+    is_drawn(&layout, &done.embedding);
+    // On a sphere patches of an icosahedron's thirds cannot be without distortion, and need not have more than this.
+    assert!(done.report.measures.conformal < 2.12, "{:?}", done.report.measures);
+}
+
+#[test]
+fn a_proxy_does_not_outlast_a_cancellation() {
+    let (stage, layout, drawing) = icosahedron_of(4);
+    let headings = headings(&layout);
+    let progress = Progress::new();
+    let mut stop = |_: &Snapshot| {
+        progress.cancel();
+        Next::Continue
+    };
+    let stopped = optimise(&stage.job(&layout, &drawing, &headings), &progress, &mut stop);
+    assert!(matches!(stopped, Err(EmbeddingError::Cancelled(_))));
 }
 
 fn embedded(settings: Settings) -> (QuadLayout, Embedded) {

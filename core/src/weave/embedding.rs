@@ -6,7 +6,7 @@ use super::design::Pin;
 use super::ground::{Ground, alike};
 use super::model::{Model, features};
 use super::session::{Session, WeaveError};
-use crate::dual::{Arrangement, Colour, RegionReport, assess, vertex_curvatures};
+use crate::dual::{Arrangement, Colour, RegionReport, assess, untangle, vertex_curvatures};
 use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
 use crate::mesh::{FaceId, TriMesh, VertexId};
@@ -108,15 +108,18 @@ fn draw_on_design(session: &Session, progress: &Progress) -> Result<Option<Drawn
 /// carried one by one, or else as they are drawn beside each other now.
 fn arranged_on_design(session: &Session, progress: &Progress) -> Result<Option<Arrangement>, WeaveError> {
     let (mesh, woven) = (&session.model().loaded.mesh, &session.woven().arrangement);
-    let like =
-        |curves: &[&SurfaceCurve]| Arrangement::new(mesh, curves.iter().copied()).ok().filter(|a| alike(a, woven));
-    let placed: Vec<&SurfaceCurve> = session.design().strips.iter().map(|s| &s.curve).collect();
-    if let Some(arrangement) = like(&placed) {
+    let like = |mut curves: Vec<SurfaceCurve>| {
+        untangle(mesh, &mut curves);
+        Arrangement::new(mesh, &curves).ok().filter(|a| alike(a, woven))
+    };
+    let placed: Vec<SurfaceCurve> = session.design().strips.iter().map(|s| s.curve.clone()).collect();
+    let count = placed.len();
+    if let Some(arrangement) = like(placed) {
         return Ok(Some(arrangement));
     }
     progress.check()?;
-    let drawn: Option<Vec<SurfaceCurve>> = (0..placed.len()).map(|i| drawn_on_design(session, i)).collect();
-    Ok(drawn.and_then(|curves| like(&curves.iter().collect::<Vec<_>>())))
+    let drawn: Option<Vec<SurfaceCurve>> = (0..count).map(|i| drawn_on_design(session, i)).collect();
+    Ok(drawn.and_then(like))
 }
 
 /// A strip as it is drawn between the others on the proxy, on the mesh of the design.

@@ -38,7 +38,7 @@ fn bent(p: DVec2) -> DVec2 {
 fn fitted_to_its_own_gradients_a_map_comes_back() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, bent);
-    let (system, free) = fitted(&mesh, &metric, &field, &uv);
+    let (mut system, free) = fitted(&mesh, &metric, &field, &uv);
     let got = system.map(&free).uv;
     let origin = got[0][0] - uv[0][0];
     for (a, b) in got.iter().flatten().zip(uv.iter().flatten()) {
@@ -50,7 +50,7 @@ fn fitted_to_its_own_gradients_a_map_comes_back() {
 fn a_bent_square_becomes_straight_without_ever_folding() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, bent);
-    let (system, free) = fitted(&mesh, &metric, &field, &uv);
+    let (mut system, free) = fitted(&mesh, &metric, &field, &uv);
     let objective = Objective::default();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
     let mut at = system.injective(&energy, free).unwrap();
@@ -118,7 +118,7 @@ fn features_are_pulled_towards_isolines() {
     let pulled: Vec<_> = mesh.halfedges().filter(slanted).map(|h| (h, 0)).collect();
     assert!(!pulled.is_empty());
     let objective = Objective::default();
-    let (system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, |p| p));
+    let (mut system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, |p| p));
     let off = |map: &SeamlessMap| -> f64 {
         let across =
             |h: HalfedgeId| map.uv[h.index() / 3][(h.index() % 3 + 1) % 3].x - map.uv[h.index() / 3][h.index() % 3].x;
@@ -127,6 +127,7 @@ fn features_are_pulled_towards_isolines() {
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).pulling(&pulled);
     let mut at = system.injective(&energy, free).unwrap();
     let before = off(&at.map);
-    system.descend(&system.newton().unwrap(), &energy, &mut at, 60, &Progress::new()).unwrap();
+    let newton = system.newton().unwrap();
+    system.descend(&newton, &energy, &mut at, 60, &Progress::new()).unwrap();
     assert!(off(&at.map) < 0.2 * before, "{} {before}", off(&at.map));
 }

@@ -112,6 +112,33 @@ fn a_strip_is_offered_browsed_placed_hidden_and_taken_back() {
 }
 
 #[test]
+fn detail_is_chosen_with_strips_in_place_and_can_be_taken_back() {
+    let mut window = open("torus");
+    hover(&mut window, FRONT);
+    click(&mut window, FRONT);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 1));
+    let length = window.state().scene().unwrap().strips[0].length;
+    window.get_by_label("Detail").click();
+    window.run_steps(30);
+    let apply = "Weave with this detail";
+    // The end of the slider: as much as there is.
+    window.get_by_role_and_label(egui::accesskit::Role::Slider, "Ignore relief below").focus();
+    window.run_steps(2);
+    for _ in 0..20 {
+        window.key_press(egui::Key::ArrowRight);
+        window.step();
+    }
+    window.get_by_label(apply).click();
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.detail.smoothing > 0.0));
+    let scene = window.state().scene().unwrap();
+    assert_eq!(scene.strips.len(), 1);
+    assert!((scene.strips[0].length - length).abs() < 1e-9, "the strip stays where it is");
+    assert!(scene.can_undo);
+    window.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.is_empty()));
+}
+
+#[test]
 fn suggestions_finish_a_torus_and_the_layout_is_shown() {
     let mut window = open("torus");
     for round in 1..=4 {

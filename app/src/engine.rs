@@ -149,6 +149,8 @@ pub trait Engine: Send {
     fn set_visible(&mut self, strip: StripId, visible: bool) -> Result<(), EngineError>;
     /// The strip that helps most now; not yet placed.
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
+    /// Weaves from now on with so much detail; the strips stay where they are.
+    fn set_detail(&mut self, detail: Detail, progress: &Progress) -> Result<(), EngineError>;
     /// Pins a part of the layout where it is, or lets it go; no change of the strips.
     fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError>;
     /// Optimises the embedding of the layout. Every improvement is handed to `watch`, which may break off: the best so
@@ -197,10 +199,21 @@ pub struct Scene {
     pub layout: Option<Arc<LayoutPreview>>,
     /// What was optimised, if the layout shown is.
     pub embedding: Option<Arc<EmbeddingSummary>>,
+    /// With how much detail is woven.
+    pub detail: Detail,
     /// Whether there is a change to take back.
     pub can_undo: bool,
     /// Whether there is one to make again.
     pub can_redo: bool,
+}
+
+/// What relief of the surface guides strips. Both are fractions of the model's size, its bounding-box diagonal.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Detail {
+    /// Radius of the ball over which curvature is taken.
+    pub curvature_radius: f64,
+    /// Relief smaller than this is smoothed away for weaving; 0: none is.
+    pub smoothing: f64,
 }
 
 /// What is known of a model.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 use plait_app::engine::{
-    BuiltIn, DisplaySurface, EmbeddingStep, EmbeddingSummary, Engine, EngineError, ExportOptions, ExportReport,
+    BuiltIn, Detail, DisplaySurface, EmbeddingStep, EmbeddingSummary, Engine, EngineError, ExportOptions, ExportReport,
     LayoutArc, LayoutNode, LayoutPart, LayoutPreview, Opener, Proposal, Scene, Source, Strip, StripId,
     TriangleDistortion,
 };
@@ -99,6 +99,9 @@ impl Engine for Session {
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
         Ok(Proposal { curve, cost: 1.0, polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2] })
     }
+    fn set_detail(&mut self, _: Detail, _: &Progress) -> Result<(), EngineError> {
+        Ok(())
+    }
     fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError> {
         match part {
             LayoutPart::Node(i) => self.layout.nodes[i].pinned = pinned,
@@ -152,6 +155,7 @@ impl Engine for Session {
             exportable: valid,
             layout: valid.then(|| Arc::new(self.layout.clone())),
             embedding: self.embedding.clone(),
+            detail: Detail::default(),
             can_undo: valid,
             can_redo: false,
         })

@@ -19,8 +19,8 @@ use plait_core::surface::SurfacePoint;
 use plait_core::weave::{self, Design, Goal, Ground, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
 
 use crate::engine::{
-    BuiltIn, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview, Opener,
-    Proposal, Refinement, Scene, Source, StripId,
+    BuiltIn, Detail, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview,
+    Opener, Proposal, Refinement, Scene, Source, StripId,
 };
 
 /// File name ending of designs.
@@ -226,6 +226,14 @@ impl Engine for SessionEngine {
         self.later.drawn = Some(or_nothing(embedding::Shown::new(&self.session, progress), progress)?);
         self.refresh();
         Ok(true)
+    }
+
+    fn set_detail(&mut self, detail: Detail, progress: &Progress) -> Result<(), EngineError> {
+        let Detail { curvature_radius, smoothing } = detail;
+        let options = Options { curvature_radius, smoothing, ..self.session.model().options };
+        let session = self.session.with_options(options, progress).map_err(|e| failed(e, Some(&self.session)))?;
+        *self = Self::new(session);
+        Ok(())
     }
 
     fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError> {

@@ -9,7 +9,7 @@ use plait_core::weave::Session;
 
 use super::cover::Cover;
 use super::{Later, stripes, words};
-use crate::engine::{DisplaySurface, ModelFacts, Scene, Strip, StripId};
+use crate::engine::{Detail, DisplaySurface, ModelFacts, Scene, Strip, StripId};
 use crate::shading::corner_normals;
 
 /// What stays the same while strips come and go.
@@ -61,6 +61,7 @@ impl ModelSnapshot {
             exportable,
             layout: later.preview(session).map(Arc::new),
             embedding: later.embedded.as_ref().map(|e| Arc::clone(&e.summary)),
+            detail: Detail { curvature_radius: model.options.curvature_radius, smoothing: model.options.smoothing },
             can_undo: session.can_undo(),
             can_redo: session.can_redo(),
         }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::distortion::Colours;
-use crate::engine::{LayoutPart, Source, StripId};
+use crate::engine::{Detail, LayoutPart, Source, StripId};
 
 /// A wish of the user, from a button, a menu or a key.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,10 @@ pub enum Action {
     Remove(StripId),
     /// Show or hide a strip.
     SetVisible(StripId, bool),
+    /// Choose how much detail is woven with; it is applied later.
+    ChooseDetail(Detail),
+    /// Weave with the detail chosen.
+    ApplyDetail,
     /// Optimise the embedding of the layout.
     Optimise,
     /// Stop the optimisation and keep the best so far.

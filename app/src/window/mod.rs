@@ -1,6 +1,7 @@
 //! The window: state, what each action does, and the layout of panels around the 3D view.
 
 mod action;
+mod detail;
 mod dialogs;
 mod embedding;
 mod icons;
@@ -24,7 +25,7 @@ use view::{Hover, Prepared};
 use crate::camera::Camera;
 use crate::distortion::Colours;
 use crate::engine::{
-    EmbeddingStep, EmbeddingSummary, EngineError, ExportOptions, LayoutPart, LayoutPreview, Opener, Refinement,
+    Detail, EmbeddingStep, EmbeddingSummary, EngineError, ExportOptions, LayoutPart, LayoutPreview, Opener, Refinement,
     RegionColor, Scene, Source, StripId,
 };
 use crate::input::Input;
@@ -68,6 +69,8 @@ pub struct PlaitApp {
     /// The embedding being optimised, as it was last heard of.
     step: Option<EmbeddingStep>,
     selected: Option<StripId>,
+    /// The detail chosen last, which need not be applied yet.
+    detail: Option<Detail>,
     messages: Messages,
     dialogs: Dialogs,
     quads: usize,
@@ -113,6 +116,7 @@ impl PlaitApp {
             colours: Colours::default(),
             step: None,
             selected: None,
+            detail: None,
             messages: Messages::default(),
             dialogs: Dialogs::default(),
             quads: DEFAULT_QUADS,
@@ -253,6 +257,7 @@ impl PlaitApp {
             self.messages.add(Tone::Note, text, None);
         }
         self.selected = None;
+        self.detail = None;
         self.step = None;
         self.colours = Colours::default();
         self.hover = Hover::default();
@@ -290,6 +295,12 @@ impl PlaitApp {
             Action::Select(strip) => self.selected = strip,
             Action::Remove(strip) => self.change(Job::Remove(strip)),
             Action::SetVisible(strip, visible) => self.worker.request(Job::SetVisible(strip, visible)),
+            Action::ChooseDetail(detail) => self.detail = Some(detail),
+            Action::ApplyDetail => {
+                if let Some(detail) = self.detail {
+                    self.change(Job::SetDetail(detail));
+                }
+            }
             Action::Optimise => self.optimise(),
             Action::Stop => self.worker.stop(),
             Action::SetPinned(part, pinned) => self.worker.request(Job::SetPinned(part, pinned)),

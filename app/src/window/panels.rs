@@ -7,7 +7,7 @@ use egui::{
 use super::action::{Action, ViewOption};
 use super::icons::{self, Icon};
 use super::messages::{Message, Tone};
-use super::{PlaitApp, embedding, theme};
+use super::{PlaitApp, detail, embedding, theme};
 use crate::engine::{LayoutPart, Remark, Scene, Source, Strip};
 use crate::shading::{self, region_rgb};
 
@@ -249,6 +249,8 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
             ui.end_row();
         }
     });
+    ui.add_space(8.0);
+    detail::show(app, scene, ui, actions);
     section(ui, "What remains");
     what_remains(scene, ui, actions);
     ui.add_space(4.0);

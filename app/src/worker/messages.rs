@@ -8,7 +8,7 @@ use std::time::Instant;
 use plait_core::progress::Progress;
 
 use crate::engine::{
-    EmbeddingStep, EngineError, ExportOptions, ExportReport, LayoutPart, Proposal, Scene, Source, StripId,
+    Detail, EmbeddingStep, EngineError, ExportOptions, ExportReport, LayoutPart, Proposal, Scene, Source, StripId,
 };
 
 /// Something to be done, in order.
@@ -28,6 +28,8 @@ pub enum Job {
     Redo,
     /// Find the strip that helps most and place it.
     Suggest,
+    /// Weave with so much detail.
+    SetDetail(Detail),
     /// Pin a part of the layout, or let it go.
     SetPinned(LayoutPart, bool),
     /// Optimise the embedding of the layout.
@@ -49,6 +51,7 @@ impl Job {
             Self::Undo => "Undoing".into(),
             Self::Redo => "Redoing".into(),
             Self::Suggest => "Looking for the strip that helps most".into(),
+            Self::SetDetail(_) => "Setting the detail".into(),
             Self::SetPinned(..) => "Pinning".into(),
             Self::Optimise => "Optimising the embedding".into(),
             Self::Save(_) => "Saving the design".into(),
@@ -58,7 +61,16 @@ impl Job {
 
     /// Whether it makes any work on the present layout useless.
     pub(super) fn changes_strips(&self) -> bool {
-        matches!(self, Self::Open(_) | Self::Place(_) | Self::Remove(_) | Self::Undo | Self::Redo | Self::Suggest)
+        matches!(
+            self,
+            Self::Open(_)
+                | Self::Place(_)
+                | Self::Remove(_)
+                | Self::Undo
+                | Self::Redo
+                | Self::Suggest
+                | Self::SetDetail(_)
+        )
     }
 }
 

@@ -127,6 +127,7 @@ impl Loop {
                 let proposal = engine.suggest(progress)?;
                 engine.place(&proposal, progress)?;
             }
+            Job::SetDetail(detail) => engine.set_detail(detail, progress)?,
             Job::SetPinned(part, pinned) => engine.set_pinned(part, pinned)?,
             Job::Optimise => {
                 let stopped = || running.stop.as_ref().is_some_and(|s| s.load(Ordering::Relaxed));

@@ -10,8 +10,8 @@ use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
 
 use super::*;
 use crate::engine::{
-    BuiltIn, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview, Proposal,
-    Scene, Source, StripId,
+    BuiltIn, Detail, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview,
+    Proposal, Scene, Source, StripId,
 };
 
 /// An engine whose answers carry the face they were asked for as their cost. Undo waits to be cancelled, redo
@@ -39,6 +39,7 @@ impl Opener for FakeOpener {
             exportable: false,
             layout: None,
             embedding: None,
+            detail: Detail::default(),
             can_undo: false,
             can_redo: false,
         }))))
@@ -83,6 +84,9 @@ impl Engine for Fake {
     }
     fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
         Err(EngineError::failed("nothing helps"))
+    }
+    fn set_detail(&mut self, _: Detail, _: &Progress) -> Result<(), EngineError> {
+        Ok(())
     }
     fn set_pinned(&mut self, _: LayoutPart, _: bool) -> Result<(), EngineError> {
         Ok(())

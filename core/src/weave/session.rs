@@ -73,6 +73,11 @@ pub enum WeaveError {
     /// No strip can be suggested.
     #[error(transparent)]
     Stuck(#[from] Stuck),
+    /// The strips do not fit the mesh that other options would weave on.
+    #[error(
+        "the strips placed make another layout on the surface with this detail; remove those on small relief first"
+    )]
+    Options,
     /// There is no such strip.
     #[error("there is no strip {}", .0.0)]
     NoStrip(StripId),
@@ -157,6 +162,33 @@ impl Session {
         let next_id = design.strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
         let (undo, redo, recent) = (Vec::new(), Vec::new(), RecentSearches::default());
         Ok(Self { model, design, woven, undo, redo, next_id, recent })
+    }
+
+    /// The same design woven under other options. Strips stay where they are; of the history there is as much as fits.
+    ///
+    /// # Errors
+    ///
+    /// See [`Model::prepare`]; [`WeaveError::Options`] if the strips make something else of the mesh that would be woven
+    /// on.
+    pub fn with_options(&self, options: Options, progress: &Progress) -> Result<Self, WeaveError> {
+        let design = Design { options, ..self.design.clone() };
+        let mut new = Self::resume(self.model.loaded.clone(), design, progress)?;
+        if new.model.options != options {
+            return Err(WeaveError::Options);
+        }
+        let fits = |step: &Step| {
+            let mut design = Design { strips: step.strips.clone(), ..new.design.clone() };
+            let fits = on_proxy(&new.model, &mut design).unwrap_or(false);
+            fits.then(|| Step { strips: design.strips, pins: step.pins.clone() })
+        };
+        let history = |steps: &[Step]| {
+            let mut kept: Vec<Step> = steps.iter().rev().map_while(fits).collect();
+            kept.reverse();
+            kept
+        };
+        let (undo, redo) = (history(&self.undo), history(&self.redo));
+        (new.undo, new.redo, new.next_id) = (undo, redo, self.next_id);
+        Ok(new)
     }
 
     /// The mesh made ready.

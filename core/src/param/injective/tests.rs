@@ -38,7 +38,7 @@ fn bent(p: DVec2) -> DVec2 {
 fn fitted_to_its_own_gradients_a_map_comes_back() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, bent);
-    let (mut system, free) = fitted(&mesh, &metric, &field, &uv);
+    let (system, free) = fitted(&mesh, &metric, &field, &uv);
     let got = system.map(&free).uv;
     let origin = got[0][0] - uv[0][0];
     for (a, b) in got.iter().flatten().zip(uv.iter().flatten()) {

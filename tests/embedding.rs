@@ -54,6 +54,21 @@ fn the_embedding_of_a_woven_layout_improves_without_folds() {
 }
 
 #[test]
+fn features_are_isolines_exactly() {
+    if support::meshes().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let report = embed(&script("fandisk_14k_fine"), folder.path(), &["--quiet"]);
+    let features = &report["layout"]["embedding"]["features"];
+    let (all, held) = (number(features, "all"), number(features, "on_isolines"));
+    assert!(all > 500.0, "{features}");
+    // Where two features of one disc meet at other than right angles, one of them crosses isolines.
+    assert!(held > 0.85 * all, "{features}");
+    assert_eq!(report["layout"]["embedding"]["flipped"], 0);
+}
+
+#[test]
 fn a_layout_file_is_embedded_like_the_design_it_was_written_from() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (folder.path().join("first"), folder.path().join("second"));

@@ -21,6 +21,8 @@ pub struct Progress {
     cancelled: AtomicBool,
     /// Fraction done, in thousandths.
     permille: AtomicU32,
+    /// The part of the whole that fractions are of, likewise; nothing: all of it.
+    part: Mutex<Option<[f64; 2]>>,
     stages: Mutex<Stages>,
 }
 
@@ -90,16 +92,24 @@ impl Progress {
     /// Reports what is being done and how much of the whole is done, from 0 to 1. The stage lasts until another is
     /// reported; one reported as wholly done takes no time.
     pub fn report(&self, stage: &str, fraction: f64) {
-        self.permille.store((fraction.clamp(0.0, 1.0) * 1000.0) as u32, Ordering::Relaxed);
+        let part = *self.part.lock().unwrap_or_else(PoisonError::into_inner);
+        let [from, to] = part.unwrap_or([0.0, 1.0]);
+        let of_whole = from + (to - from) * fraction.clamp(0.0, 1.0);
+        self.permille.store((of_whole * 1000.0) as u32, Ordering::Relaxed);
         let mut stages = self.stages();
         let same = stages.now.is_some_and(|now| stages.met[now].stage == stage);
         if !same {
             stages.close();
             stages.open(stage);
         }
-        if fraction >= 1.0 {
+        if fraction >= 1.0 && part.is_none() {
             stages.close();
         }
+    }
+
+    /// Takes the fractions reported from now on for those of a part of the whole, or of all of it again.
+    pub fn take_part(&self, part: Option<[f64; 2]>) {
+        *self.part.lock().unwrap_or_else(PoisonError::into_inner) = part;
     }
 
     /// The stage and the fraction last reported.

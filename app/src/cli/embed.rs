@@ -90,6 +90,11 @@ pub(super) fn summary(export: &Export) -> String {
             text += &format!(", {} chords collapsed", report.collapsed.len());
         }
     }
+    if let Some(Ok(report)) = &export.optimised
+        && report.features.all > 0
+    {
+        text += &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.all);
+    }
     let m = export.measures();
     text += &format!(
         ", {} flipped, conformal {:.3}, planar {:.3}, alignment {:.2}°",

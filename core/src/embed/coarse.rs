@@ -28,6 +28,9 @@ const PER_PATCH: usize = 60;
 const WORTH: usize = 2;
 /// By what factor a mesh that is too coarse for the layout is made finer.
 const FINER: usize = 2;
+/// What part of the work is done on the proxy, and on the mesh; of the latter the first half is left out.
+const ON_PROXY: [f64; 2] = [0.0, 0.6];
+const ON_MESH: [f64; 2] = [0.2, 1.0];
 /// Steps of the nodes on the mesh itself.
 const FINE_STEPS: usize = 1;
 
@@ -51,6 +54,7 @@ pub(super) fn coarse_to_fine(
     let mut target = COARSE.max(PER_PATCH * patches);
     while job.surface.mesh.n_faces() > WORTH * target {
         let found = by_way_of_proxy(job, target, progress, watch);
+        progress.take_part(None);
         progress.check()?;
         match found {
             Ok(Some(done)) => return Ok(Some(done)),
@@ -79,8 +83,10 @@ fn by_way_of_proxy(
     let curvature: Vec<PrincipalCurvature> =
         mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
     let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
+    progress.take_part(Some(ON_PROXY));
     let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
     let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
+    progress.take_part(Some(ON_MESH));
     let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
     let settings = Settings { steps: FINE_STEPS.min(job.settings.steps), ..job.settings };
     let fine = Job { drawing: &drawing, settings, ..*job };

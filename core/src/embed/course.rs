@@ -99,7 +99,7 @@ impl<'w> Course<'w> {
         }
         progress.report("Removing folds", 0.4);
         let found = optimizer.finish(progress).and_then(|folds| {
-            let done = finished(job, optimizer.state(), &folds, self.area, progress)?;
+            let done = finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)?;
             Ok((done, optimizer))
         });
         let mut done = self.unfolded(job, found, progress)?;
@@ -171,7 +171,7 @@ impl<'w> Course<'w> {
         match self.held(job, &mut optimizer, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes stay where they were");
-                finished(job, &safe, &[], self.area, progress)
+                finished(job, (&safe, &optimizer.sharp), &[], self.area, progress)
             }
             done => done,
         }
@@ -185,14 +185,14 @@ impl<'w> Course<'w> {
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
         let folds = optimizer.finish(progress)?;
-        finished(job, optimizer.state(), &folds, self.area, progress)
+        finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)
     }
 }
 
 /// Arcs and patches of a map that is done. The report lacks what happened before.
 fn finished(
     job: &Job<'_>,
-    state: &State,
+    (state, sharp): (&State, &[bool]),
     folds: &[Fold],
     area: f64,
     progress: &Progress,
@@ -235,6 +235,7 @@ fn finished(
         folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),
         collapsed: Vec::new(),
         short: Vec::new(),
+        features: state.features(sharp),
         measures,
     };
     Ok(Embedded { layout, embedding, maps, drawing: None, report })

@@ -64,6 +64,8 @@ pub struct Optimizer<'a> {
     pub(super) shape: Option<Shape>,
     /// What is done about features.
     pub(super) features: Features,
+    /// Edges of features that are only pulled even where others are held; empty: none.
+    pub(super) loose: Vec<bool>,
     pub(super) state: State,
     /// Factor of the steps of every node.
     pub(super) pace: Vec<f64>,
@@ -138,6 +140,7 @@ impl<'a> Optimizer<'a> {
             sizes: None,
             settings,
             features,
+            loose: &[],
         };
         let state = match solver.solve(net, metric, None, aim, progress)? {
             Ok(state) => state,
@@ -160,6 +163,7 @@ impl<'a> Optimizer<'a> {
             sizes,
             shape,
             features,
+            loose: Vec::new(),
             state,
             pace: vec![1.0; layout.nodes.len()],
             heading: vec![DVec3::ZERO; layout.nodes.len()],
@@ -336,6 +340,7 @@ impl<'a> Optimizer<'a> {
             sizes: self.sizes.take(),
             settings: self.settings,
             features: self.features,
+            loose: &self.loose,
         };
         let next = solver.solve(net, metric, Some(&self.state.field.angle), aim, progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);

@@ -2,10 +2,10 @@
 
 use super::EmbeddingError;
 use super::descent::{HOPELESS, Optimizer};
-use super::solver::Features;
+use super::solver::{Features, Folded};
 use super::state::State;
 use crate::field::GuidedSystem;
-use crate::mesh::TriMesh;
+use crate::mesh::{FaceId, TriMesh};
 use crate::param::{Effort, Fold};
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
@@ -17,6 +17,8 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
+/// How often features are let go where the map would fold, each time a ring of triangles farther around.
+const LOOSENINGS: usize = 6;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
 /// By what share the energy changes when they have come there.
@@ -76,20 +78,41 @@ impl Optimizer<'_> {
         Ok(unfolded.folds)
     }
 
-    /// Makes features isolines that were pulled towards them, if a map without folds allows it.
+    /// Makes features isolines that were pulled towards them, where a map without folds allows it.
     fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         if self.features == Features::Held || !self.sharp.contains(&true) {
             return Ok(());
         }
         self.features = Features::Held;
-        match self.attempt(self.state.net.clone(), progress)? {
-            Ok(state) => self.state = state,
-            Err(_) => {
-                self.features = Features::Pulled;
-                tracing::debug!("features are not isolines exactly");
+        for round in 1..=LOOSENINGS {
+            match self.attempt(self.state.net.clone(), progress)? {
+                Ok(state) => {
+                    self.state = state;
+                    return Ok(());
+                }
+                Err(Folded(list)) => self.loosen(&list, round),
             }
         }
+        self.features = Features::Pulled;
+        self.loose.clear();
+        tracing::debug!("features are not isolines exactly");
         Ok(())
+    }
+
+    /// Lets the features around triangles that fold, so many rings far, be pulled only.
+    fn loosen(&mut self, folded: &[FaceId], rings: usize) {
+        let mesh = &self.state.net.mesh;
+        let mut near = vec![false; mesh.n_vertices()];
+        let mut faces: Vec<FaceId> = folded.to_vec();
+        for _ in 0..rings {
+            faces.iter().flat_map(|&f| mesh.face_vertices(f)).for_each(|v| near[v.index()] = true);
+            faces = mesh.faces().filter(|&f| mesh.face_vertices(f).iter().any(|v| near[v.index()])).collect();
+        }
+        self.loose.resize(mesh.n_edges(), false);
+        for e in mesh.edges().filter(|e| self.sharp[e.index()]) {
+            self.loose[e.index()] |= mesh.edge_vertices(e).iter().any(|v| near[v.index()]);
+        }
+        tracing::debug!(loose = self.loose.iter().filter(|&&l| l).count(), "features let go where the map would fold");
     }
 
     /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.

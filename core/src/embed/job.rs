@@ -132,8 +132,20 @@ pub struct EmbeddingReport {
     pub collapsed: Vec<CollapsedChord>,
     /// Chords that were to be collapsed and could not be.
     pub short: Vec<ShortChord>,
+    /// Edges of features.
+    pub features: FeatureEdges,
     /// Measures of all patches together.
     pub measures: Measures,
+}
+
+/// Sharp edges inside the surface, on the mesh that the layout is embedded on, which may be finer than that given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FeatureEdges {
+    /// How many there are.
+    pub all: usize,
+    /// How many lie on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which the
+    /// surface's bounding-box diagonal is 1.
+    pub on_isolines: usize,
 }
 
 /// A layout with its optimised embedding.

@@ -56,7 +56,7 @@ pub use collapse::{CollapsedChord, ShortChord};
 pub use descent::Optimizer;
 pub use emerge::{EmergeError, Emerged, emerge};
 pub use guides::{feature_guides, shape_guides};
-pub use job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Settings, Snapshot, Surface};
+pub use job::{Embedded, EmbeddingReport, FeatureEdges, Job, Next, RemainingFold, Settings, Snapshot, Surface};
 pub use measures::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use net::{Headings, Net, NetArc, NetNode, headings};
 pub use optimise::optimise;

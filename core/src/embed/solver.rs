@@ -101,6 +101,8 @@ pub(super) struct Solver<'s> {
     pub settings: Settings,
     /// What is done about features.
     pub features: Features,
+    /// Edges of features that are only pulled even so; empty: none.
+    pub loose: &'s [bool],
 }
 
 impl Solver<'_> {
@@ -120,7 +122,9 @@ impl Solver<'_> {
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let features = alignment::features(&net, &metric, &field.angle, self.sharp);
-        let pulled = if self.features == Features::Pulled { &features[..] } else { &[] };
+        let is_loose = |h: HalfedgeId| self.loose.get(mesh.edge(h).index()).copied().unwrap_or(false);
+        let only_pulled = |f: &(HalfedgeId, u8)| self.features == Features::Pulled || is_loose(f.0);
+        let (pulled, features): (Vec<_>, Vec<_>) = features.into_iter().partition(only_pulled);
         let (sizing, sizes) = (self.settings.sizing, self.sizes.take());
         let (lengths, built) = rayon::join(
             || if sizing { lengths((mesh, &metric), &angle, &net.jump, sizes) } else { Ok((Vec::new(), sizes)) },
@@ -135,6 +139,7 @@ impl Solver<'_> {
             Aim::LeastSquares => Ok(system.solve(&metric, &field, &objective, progress)?),
             Aim::Injective { shape, start, steps } => {
                 let firmness = &firmness;
+                let pulled = &pulled;
                 let setting =
                     Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness, pulled };
                 setting.injective(&mut system, shape, start, steps, progress)?
@@ -153,10 +158,7 @@ impl Solver<'_> {
         features: &[(HalfedgeId, u8)],
     ) -> Result<SeamlessSystem, EmbeddingError> {
         let demanded = alignment::demanded(net, self.roads);
-        let mut features: Vec<Relation> = match self.features {
-            Features::Pulled => Vec::new(),
-            Features::Held => features.iter().map(|&f| alignment::on_edge(net, f)).collect(),
-        };
+        let mut features: Vec<Relation> = features.iter().map(|&f| alignment::on_edge(net, f)).collect();
         let mut spacing = self.spacing.relations(net, self.roads);
         let mut system = self.seamless.take();
         loop {

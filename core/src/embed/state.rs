@@ -2,11 +2,11 @@
 
 use glam::DVec2;
 
-use super::job::Snapshot;
+use super::job::{FeatureEdges, Snapshot};
 use super::net::{Net, NetArc};
 use super::trace::{ArcChain, preview_arcs};
 use crate::field::{CrossField, Metric};
-use crate::mesh::VertexId;
+use crate::mesh::{EdgeId, VertexId};
 use crate::param::{Objective, Residual, Solution, residuals};
 
 /// Field and map for nodes at certain places.
@@ -28,6 +28,8 @@ pub struct State {
 
 /// Share of the wanted area below which an image is as good as flat.
 const FLAT: f64 = 1e-3;
+/// Coordinates that differ by no more are the same.
+const SAME: f64 = 1e-9;
 
 impl State {
     /// Number of triangles that the map turns over, or by more than a right angle away from the field.
@@ -51,6 +53,18 @@ impl State {
     pub(super) fn least_squares(&self) -> f64 {
         let each = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
         each.iter().map(|r| r.energy).sum()
+    }
+
+    /// How many of the edges that are `sharp` lie on isolines.
+    pub(super) fn features(&self, sharp: &[bool]) -> FeatureEdges {
+        let (mesh, uv) = (&self.net.mesh, &self.solution.map.uv);
+        let inner = || mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e));
+        let on_isoline = |&e: &EdgeId| {
+            let h = mesh.halfedge(e).index();
+            let [p, q] = [h % 3, (h + 1) % 3].map(|k| uv[h / 3][k]);
+            (p - q).abs().min_element() <= SAME
+        };
+        FeatureEdges { all: inner().count(), on_isolines: inner().filter(on_isoline).count() }
     }
 
     pub(super) fn chains(&self) -> Vec<ArcChain<'_>> {

@@ -12,7 +12,7 @@ use super::export::{Export, write_file};
 use super::ground::Ground;
 use super::session::{Session, WeaveError};
 use crate::dual::{Colour, RegionReport};
-use crate::embed::{CollapsedChord, Measures, ShortChord, Surface, face_curvature, measure_patches};
+use crate::embed::{CollapsedChord, FeatureEdges, Measures, ShortChord, Surface, face_curvature, measure_patches};
 use crate::layout::{Embedding, PatchMap};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
 use crate::quad::quality;
@@ -143,6 +143,8 @@ struct Course {
     /// Chords that were collapsed, in order, and those that were to be and could not be.
     collapsed: Vec<CollapsedChord>,
     short: Vec<ShortChord>,
+    /// Edges of features, and how many of them lie on isolines.
+    features: FeatureEdges,
 }
 
 #[derive(Serialize)]
@@ -279,6 +281,7 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
             .collect(),
         collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
         short: r.short.iter().map(|c| ShortChord { length: c.length * scale, ..c.clone() }).collect(),
+        features: r.features,
     });
     let patch = |p: &crate::embed::PatchMeasures| PatchSection {
         aspect: p.aspect,

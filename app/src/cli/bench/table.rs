@@ -48,11 +48,13 @@ pub(super) fn markdown(reports: &[Report]) -> String {
     let both = |r: &Row| format!("{} / {}", figure(r.median), figure(r.p95));
     let median = |r: &Row| figure(r.median);
     type Cell<'a> = (&'a str, &'a str, &'a str, &'a dyn Fn(&Row) -> String);
-    let columns: [Cell; 8] = [
+    let columns: [Cell; 10] = [
         ("opened and ready", open::GROUP, open::READY, &median),
         ("a loop shown, median / p95", &bare, SHOWN, &both),
         ("proved best, median / p95", &bare, PROVED, &both),
         ("alternatives to 1.5 × best, median", &bare, ALTERNATIVES, &median),
+        ("cross field after a placement, median", strips::GROUP, "Cross field", &median),
+        ("strip map, median", strips::GROUP, "Strip map", &median),
         ("all that follows a placement, median", strips::GROUP, strips::PLACED, &median),
         ("embedded", embed::GROUP, embed::EMBEDDED, &median),
         ("plain Dijkstra over the graph", reference::GROUP, reference::DIJKSTRA, &median),

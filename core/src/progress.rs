@@ -152,4 +152,20 @@ mod tests {
         std::thread::sleep(std::time::Duration::from_millis(2));
         assert_eq!(progress.stage_times(), before);
     }
+
+    #[test]
+    fn a_part_of_the_work_reports_as_a_part_of_the_whole() {
+        let progress = Progress::new();
+        progress.take_part(Some([0.2, 0.6]));
+        progress.report("part", 0.5);
+        assert_eq!(progress.state(), ("part".to_owned(), 0.4));
+        // The end of a part is not the end: time goes on.
+        progress.report("part", 1.0);
+        let before = progress.stage_times()[0].seconds;
+        std::thread::sleep(std::time::Duration::from_millis(2));
+        assert!(progress.stage_times()[0].seconds > before);
+        progress.take_part(None);
+        progress.report("rest", 0.9);
+        assert_eq!(progress.state(), ("rest".to_owned(), 0.9));
+    }
 }

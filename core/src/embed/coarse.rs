@@ -28,8 +28,10 @@ const PER_PATCH: usize = 60;
 const WORTH: usize = 2;
 /// By what factor a mesh that is too coarse for the layout is made finer.
 const FINER: usize = 2;
-/// What part of the work is done on the proxy, and on the mesh; of the latter the first half is left out.
-const ON_PROXY: [f64; 2] = [0.0, 0.6];
+/// What part of the work is to make the proxy, and what is done on it and on the mesh; of the latter the first half is
+/// left out.
+const SIMPLIFYING: [f64; 2] = [0.0, 0.05];
+const ON_PROXY: [f64; 2] = [0.05, 0.6];
 const ON_MESH: [f64; 2] = [0.2, 1.0];
 /// Steps of the nodes on the mesh itself.
 const FINE_STEPS: usize = 1;
@@ -74,6 +76,7 @@ fn by_way_of_proxy(
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<Option<Embedded>, EmbeddingError> {
     let Job { surface, layout, .. } = *job;
+    progress.take_part(Some(SIMPLIFYING));
     progress.report("Simplifying the mesh", 0.0);
     let proxy = Proxy::new(surface.mesh, surface.sharp, target, progress)?;
     let levels = Levels { fine: surface.mesh, proxy: &proxy };

@@ -219,8 +219,7 @@ impl Proxy {
     pub fn curve_to_original(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
         curve.check(self.mesh())?;
         let guide = Guide::new(self.mesh(), curve);
-        let walker = Walker { mesh: original, places: self.places(), guide: &guide };
-        walker.follow(self, |point| self.to_original(original, point).face)
+        self.along_on_original(original, &guide)
     }
 
     /// As [`Self::curve_to_original`] for a line over the proxy: its points, each with the face in which it goes on to
@@ -239,8 +238,7 @@ impl Proxy {
             return Err(CarryError::Lost);
         }
         let guide = Guide::along(self.mesh(), line, closed);
-        let walker = Walker { mesh: original, places: self.places(), guide: &guide };
-        walker.follow(self, |point| self.to_original(original, point).face)
+        self.along_on_original(original, &guide)
     }
 
     /// The curve on the proxy that goes as `curve` goes on the original, as [`Self::curve_to_original`] the other way.
@@ -252,8 +250,7 @@ impl Proxy {
         curve.check(original)?;
         let points = (0..curve.crossings.len()).map(|i| curve.surface_point(original, i));
         let guide = Guide::image(self, original, points, curve.closed);
-        let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide: &guide };
-        walker.follow(self, |point| point.face)
+        self.along(&guide)
     }
 
     /// As [`Self::curve_to_proxy`] for a line over the original, as in [`Self::line_to_original`].
@@ -275,7 +272,16 @@ impl Proxy {
             SurfacePoint { face, weights: nearest_in_triangle(p, &corners) }
         });
         let guide = Guide::image(self, original, points, closed);
-        let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide: &guide };
+        self.along(&guide)
+    }
+
+    fn along_on_original(&self, original: &TriMesh, guide: &Guide) -> Result<SurfaceCurve, CarryError> {
+        let walker = Walker { mesh: original, places: self.places(), guide };
+        walker.follow(self, |point| self.to_original(original, point).face)
+    }
+
+    fn along(&self, guide: &Guide) -> Result<SurfaceCurve, CarryError> {
+        let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide };
         walker.follow(self, |point| point.face)
     }
 }

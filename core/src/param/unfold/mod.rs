@@ -152,7 +152,6 @@ pub fn unfold(
     effort: Effort,
     progress: &Progress,
 ) -> Result<Unfolded, Cancelled> {
-    progress.report("Removing folds", 0.0);
     let folded = problem.folded(&problem.reduction.expand(y));
     let energy_before = problem.energy(y);
     let mut out =
@@ -239,12 +238,11 @@ impl Attempt<'_> {
     fn relieve(&self, y: &[f64], rings: &[u32]) -> Result<Candidate, Cancelled> {
         let mut y = y.to_vec();
         let mut before: Vec<Domain> = Vec::new();
-        for (i, &rings) in rings.iter().enumerate() {
+        for &rings in rings {
             let folds = self.folds(&y);
             if folds.is_empty() {
                 break;
             }
-            self.progress.report("Removing folds", (i as f64 + 0.5) / (RINGS.len() as f64 + 2.0));
             let domains = self.neighbours.domains(self.problem, &folds, rings);
             // A domain that could not grow will not do better.
             let grown: Vec<Domain> = domains.iter().filter(|d| !before.contains(d)).cloned().collect();
@@ -259,7 +257,6 @@ impl Attempt<'_> {
 
     /// Unfolds what can be unfolded beside folds that cannot.
     fn relax(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
-        self.progress.report("Removing folds", 0.7);
         let mut y = y.to_vec();
         let domains = self.neighbours.domains(self.problem, &self.folds(&y), RELAXED_RINGS);
         self.change(&mut y, &domains, |local| local.relax(self.progress))?;
@@ -287,7 +284,6 @@ impl Attempt<'_> {
     /// Unfolds together with all places that share a translation or a relation with the folds, or the whole at once
     /// where that is about as much.
     fn relieve_bound(&self, y: &[f64]) -> Result<Candidate, Cancelled> {
-        self.progress.report("Removing folds", 0.6);
         let (problem, neighbours) = (self.problem, self.neighbours);
         let mut y = y.to_vec();
         for domain in neighbours.domains(problem, &self.folds(&y), RINGS[RINGS.len() - 1]) {

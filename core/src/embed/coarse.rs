@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::EmbeddingError;
 use super::course::Course;
 use super::descent::Optimizer;
-use super::injective::Drawn;
+use super::injective::{Drawn, STEPS};
 use super::job::{Embedded, Job, Next, Settings, Snapshot, Surface};
 use super::optimise::optimise;
 use crate::layout::{Embedding, Line, PatchMap, QuadLayout, carry};
@@ -33,6 +33,8 @@ const FINER: usize = 2;
 const SIMPLIFYING: [f64; 2] = [0.0, 0.05];
 const ON_PROXY: [f64; 2] = [0.05, 0.6];
 const ON_MESH: [f64; 2] = [0.2, 1.0];
+/// Steps of Newton's method for the first map on the mesh: it starts near, and all that follows makes it better.
+const FIRST_STEPS: usize = 8;
 /// Steps of the nodes on the mesh itself.
 const FINE_STEPS: usize = 1;
 
@@ -87,7 +89,8 @@ fn by_way_of_proxy(
         mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
     let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
     progress.take_part(Some(ON_PROXY));
-    let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
+    let settings = Settings { exact_features: false, ..job.settings };
+    let on_proxy = Job { surface: coarse, drawing: &drawing, settings, ..*job };
     let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
     progress.take_part(Some(ON_MESH));
     let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
@@ -95,9 +98,9 @@ fn by_way_of_proxy(
     let fine = Job { drawing: &drawing, settings, ..*job };
     let drawn = Drawn::new(layout, &drawing, progress)?;
     let guess = levels.guess(&drawn, &coarse.maps);
-    let start = match Optimizer::from_drawn(&fine, &drawn, &guess, progress)? {
+    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS), progress)? {
         Ok(start) => Ok(start),
-        Err(_) => Optimizer::from_drawn(&fine, &drawn, &drawn.uv, progress)?,
+        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS), progress)?,
     };
     let mut course = Course::going_on(&fine, &coarse.report, watch);
     let mut done = course.without_folds(&fine, Ok(start), progress)?;

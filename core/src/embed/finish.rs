@@ -80,7 +80,7 @@ impl Optimizer<'_> {
 
     /// Makes features isolines that were pulled towards them, where a map without folds allows it.
     fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        if self.features == Features::Held || !self.sharp.contains(&true) {
+        if !self.settings.exact_features || self.features == Features::Held || !self.sharp.contains(&true) {
             return Ok(());
         }
         self.features = Features::Held;

@@ -77,7 +77,7 @@ impl Drawn {
 /// not to be paid for by angles.
 const SIZE: f64 = 0.06;
 /// Steps of Newton's method for a first map: it has long converged by then.
-const STEPS: usize = 60;
+pub(super) const STEPS: usize = 60;
 
 impl<'a> Optimizer<'a> {
     /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.
@@ -87,10 +87,11 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Result<Self, Folded>, EmbeddingError> {
         let drawn = Drawn::new(job.layout, job.drawing, progress)?;
-        Self::from_drawn(job, &drawn, &drawn.uv, progress)
+        Self::from_drawn(job, &drawn, (&drawn.uv, STEPS), progress)
     }
 
-    /// As [`Self::from_drawing`], from a map near to that with coordinates `uv` of the corners of each triangle.
+    /// As [`Self::from_drawing`], from a map near to that with coordinates `uv` of the corners of each triangle, in so many
+    /// steps of Newton's method at most.
     ///
     /// # Errors
     ///
@@ -98,7 +99,7 @@ impl<'a> Optimizer<'a> {
     pub(super) fn from_drawn(
         job: &Job<'a>,
         drawn: &Drawn,
-        uv: &[[DVec2; 3]],
+        (uv, steps): (&[[DVec2; 3]], usize),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
@@ -106,7 +107,7 @@ impl<'a> Optimizer<'a> {
             *f = FaceId(drawn.base_face[f.index()]);
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::Injective { shape: shape(job), start: Start::Map(uv), steps: STEPS };
+        let aim = Aim::Injective { shape: shape(job), start: Start::Map(uv), steps };
         Self::on(job, (net, sharp, curvature), (aim, Features::Pulled), progress)
     }
 

@@ -80,7 +80,7 @@ const FIRMEST: f64 = 4.0;
 /// Up to how many folds of the first guess of a map are worth removing one by one: after a step, to which there is an
 /// alternative, and at first.
 const FEW: usize = 50;
-const FEW_AT_FIRST: usize = 200;
+const FEW_AT_FIRST: usize = 2000;
 /// How often a first guess is fitted again with more weight on the triangles that fold, and by how much more.
 const REFITS: usize = 2;
 const FIRMER: f64 = 9.0;

@@ -57,26 +57,28 @@ pub(super) fn interpolate_vectors(
             free.push(f);
         }
     }
-    let (matrix, rhs) = assemble(mesh, metric, hard, pull, &index, &free, 0.0);
+    let (matrix, rhs) = assemble(mesh, metric, hard, pull, &index, &free);
     progress.check()?;
-    let density = (REACH * REACH).recip();
-    let (heavy, _) = assemble(mesh, metric, hard, pull, &index, &free, density);
     let symbolic = SpdSymbolic::new(&matrix)?;
     progress.check()?;
-    let (factor, heavy_factor) = rayon::join(|| symbolic.factor(&matrix), || symbolic.factor(&heavy));
-    let (factor, heavy_factor) = (factor?, heavy_factor?);
-    progress.check()?;
-
-    let held = held_components(mesh, hard, pull);
-    let loose: Vec<bool> = free.iter().map(|f| !held[f.index()]).collect();
-    let mut z = factor.solve(&matrix, &rhs)?;
-    if loose.contains(&true) {
-        let mass: Vec<f64> = free.iter().map(|&f| metric.area(f)).collect();
-        z = inverse_iteration(&matrix, &factor, &rhs, &loose, &mass, progress)?;
-    }
+    let mass: Vec<f64> = free.iter().map(|&f| metric.area(f)).collect();
+    let harmonic = || {
+        let factor = symbolic.factor(&matrix)?;
+        let held = held_components(mesh, hard, pull);
+        let loose: Vec<bool> = free.iter().map(|f| !held[f.index()]).collect();
+        if loose.contains(&true) {
+            inverse_iteration(&matrix, &factor, &rhs, &loose, &mass, progress)
+        } else {
+            Ok(factor.solve(&matrix, &rhs)?)
+        }
+    };
+    let density = (REACH * REACH).recip();
+    let heavy = with_mass(&matrix, &mass, density);
+    let (z, heavy_factor) = rayon::join(harmonic, || symbolic.factor(&heavy));
+    let (mut z, heavy_factor) = (z?, heavy_factor?);
     for _ in 0..STEPS {
         progress.check()?;
-        let from = |i: usize| rhs[i] + unit(z[i]) * (density * metric.area(free[i]));
+        let from = |i: usize| rhs[i] + unit(z[i]) * (density * mass[i]);
         let b: Vec<c64> = (0..z.len()).map(from).collect();
         z = heavy_factor.solve(&heavy, &b)?;
     }
@@ -90,7 +92,7 @@ fn unit(z: c64) -> c64 {
     if norm > f64::MIN_POSITIVE && norm.is_finite() { z / norm } else { c64::new(1.0, 0.0) }
 }
 
-/// The system of the free triangles, with a mass of `density` per area added.
+/// The system of the free triangles.
 fn assemble(
     mesh: &TriMesh,
     metric: &Metric,
@@ -98,7 +100,6 @@ fn assemble(
     pull: &Pull,
     index: &[u32],
     free: &[FaceId],
-    density: f64,
 ) -> (SparseHermitian<c64>, Vec<c64>) {
     let mean = mesh.faces().map(|f| metric.area(f)).sum::<f64>() / mesh.n_faces().max(1) as f64;
     let mut triplets = Vec::with_capacity(4 * free.len());
@@ -111,7 +112,7 @@ fn assemble(
         }
         // At least some ground for the smallest triangle, or its row might vanish.
         let ground = GROUND * (area / mean).clamp(1e-3, 1e3);
-        triplets.push((i as u32, i as u32, c64::new(ground + strength + density * area, 0.0)));
+        triplets.push((i as u32, i as u32, c64::new(ground + strength, 0.0)));
     }
     for e in mesh.edges() {
         let h = mesh.halfedge(e);
@@ -131,6 +132,17 @@ fn assemble(
         }
     }
     (SparseHermitian::from_triplets(free.len(), &triplets), rhs)
+}
+
+/// The same system with so much of a mass added.
+fn with_mass(matrix: &SparseHermitian<c64>, mass: &[f64], density: f64) -> SparseHermitian<c64> {
+    let mut heavy = matrix.clone();
+    for (value, (row, column, _)) in heavy.values_mut().iter_mut().zip(matrix.entries()) {
+        if row == column {
+            *value += c64::new(density * mass[row as usize], 0.0);
+        }
+    }
+    heavy
 }
 
 /// The weight of the edge of `h` and its twin: length over distance of the centres, within bounds.

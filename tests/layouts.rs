@@ -14,7 +14,7 @@ use plait_core::layout::{Arc, Embedding, Line, Node, Patch, QuadLayout, carry, m
 use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::proxy::Proxy;
-use plait_core::quad::{refine, whole_counts};
+use plait_core::quad::{Stops, refine, whole_counts};
 use plait_core::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
 use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
 use support::{meshes, root};
@@ -438,7 +438,7 @@ fn patches_are_whole_numbers_of_quads() {
     let (_, done) = embedded(Settings { integer: Some(edge), ..Settings::default() });
     let (counts, off) = whole_counts(&done.layout, &done.maps, edge);
     assert!(off < 1e-9, "{off}");
-    let quads = refine(&done.layout, &done.embedding, &done.maps, &counts);
+    let quads = refine(&done.layout, &done.embedding, &done.maps, &Stops::even(&done.layout, &counts));
     let whole: f64 = done.maps.iter().map(|m| m.size.x * m.size.y).sum();
     assert!((quads.quads.len() as f64 * edge * edge - whole).abs() < 1e-9, "all quads are unit squares");
     let triangles: Vec<[u32; 3]> = quads.quads.iter().flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]).collect();

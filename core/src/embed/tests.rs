@@ -7,7 +7,7 @@ use crate::layout::PatchMap;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, refine};
+use crate::quad::{QuadMesh, Stops, refine};
 
 fn trace(s: &Sample) -> Result<Traced, TraceError> {
     trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), Folds::Refuse)
@@ -39,7 +39,7 @@ fn rectangles(s: &Sample) -> (Traced, Vec<PatchMap>) {
         let length = |p: &[DVec3]| p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
         assert!((length(line) - length(&path)).abs() < 1e-3 * length(&path));
     }
-    let quads = refine(&s.layout, &traced.embedding, &maps, &vec![5; s.layout.chords]);
+    let quads = refine(&s.layout, &traced.embedding, &maps, &Stops::even(&s.layout, &vec![5; s.layout.chords]));
     assert_eq!(euler(&quads), s.mesh.euler_characteristic());
     (traced, maps)
 }
@@ -85,7 +85,7 @@ fn arcs_inside_a_square_cross_triangles() {
 fn quads_continue_across_arcs_by_the_parameter() {
     let s = samples::square(8, 2, 0.3);
     let (traced, maps) = rectangles(&s);
-    let quads = refine(&s.layout, &traced.embedding, &maps, &vec![4; s.layout.chords]);
+    let quads = refine(&s.layout, &traced.embedding, &maps, &Stops::even(&s.layout, &vec![4; s.layout.chords]));
     // The map is the identity: all vertices of the quads lie on a regular grid.
     for p in &quads.positions {
         assert!((*p * 8.0 - (*p * 8.0).round()).length() < 1e-9, "{p}");
@@ -258,7 +258,7 @@ fn emerged(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId]) -> Emerged {
     assert!(maps.iter().all(|m| m.flipped == 0));
     let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
     assert!((parts - area(mesh)).abs() < 1e-9);
-    let quads = refine(&e.layout, &e.traced.embedding, &maps, &vec![4; e.layout.chords]);
+    let quads = refine(&e.layout, &e.traced.embedding, &maps, &Stops::even(&e.layout, &vec![4; e.layout.chords]));
     assert_eq!(euler(&quads), mesh.euler_characteristic());
     e
 }

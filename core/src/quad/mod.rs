@@ -6,6 +6,10 @@ mod rail;
 mod refine;
 mod shape;
 mod smooth;
+mod stops;
+mod worst;
 
-pub use refine::{QuadMesh, chord_counts, refine, whole_counts};
+pub use refine::{QuadMesh, refine, whole_counts};
 pub use smooth::{land, quality, scaled_jacobians, smooth};
+pub use stops::Stops;
+pub use worst::{Held, mend};

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
+use super::stops::Stops;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 
 /// A quad mesh that refines a layout.
@@ -26,23 +27,6 @@ pub struct QuadMesh {
     pub arcs: Vec<Vec<u32>>,
 }
 
-/// The number of quads across every chord for quads of edge length `target`.
-///
-/// At least three, so that no two quads of the result share two edges and no quad touches itself, however
-/// small the layout.
-pub fn chord_counts(layout: &QuadLayout, maps: &[PatchMap], target: f64) -> Vec<u32> {
-    let mut counts = vec![MIN_QUADS; layout.chords];
-    for (p, map) in layout.patches.iter().zip(maps) {
-        for (i, length) in [(0, map.size.x), (1, map.size.y)] {
-            let chord = layout.arcs[p.sides[i].0 as usize].chord as usize;
-            counts[chord] = counts[chord].max((length / target).round().min(1e4) as u32);
-        }
-    }
-    counts
-}
-
-const MIN_QUADS: u32 = 3;
-
 /// The number of quads across every chord where all chords are multiples of `edge` in the maps, and by what share of an
 /// edge some chord is off at most.
 pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
@@ -59,8 +43,8 @@ pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u
     (counts, off)
 }
 
-/// Refines every patch to a grid of as many quads as `counts` says for its two chords.
-pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], counts: &[u32]) -> QuadMesh {
+/// Refines every patch to the grid of the lines along its two chords.
+pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], stops: &Stops) -> QuadMesh {
     let position = |v: u32| embedding.mesh.positions[v as usize];
     let face_at = |v: u32| embedding.base_face[(embedding.mesh.outgoing(v)[0] / 3) as usize];
     let mut out = QuadMesh {
@@ -73,10 +57,10 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
         arcs: Vec::with_capacity(layout.arcs.len()),
     };
     let mut first_on_arc = Vec::with_capacity(layout.arcs.len());
-    for ((arc, path), along) in layout.arcs.iter().zip(&embedding.arcs).zip(&embedding.arc_parameters) {
+    for (a, arc) in (0..).zip(&layout.arcs) {
+        let (path, along) = (&embedding.arcs[a as usize], &embedding.arc_parameters[a as usize]);
         first_on_arc.push(out.positions.len() as u32);
-        let n = counts[arc.chord as usize];
-        for (at, v) in along_path(path, along, n, position) {
+        for (at, v) in along_path(path, along, &stops.along(a, true), position) {
             out.positions.push(at);
             out.base_face.push(face_at(v));
             out.boundary.push(arc.boundary);
@@ -85,12 +69,14 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
         out.arcs.push([arc.nodes[0]].into_iter().chain(inner).chain([arc.nodes[1]]).collect());
     }
     for (p, map) in maps.iter().enumerate() {
-        let [m, n] = [0, 1].map(|i| counts[layout.arcs[layout.patches[p].sides[i].0 as usize].chord as usize]);
+        let [across, up] = [0, 1].map(|i| {
+            let (arc, forward) = layout.patches[p].sides[i];
+            stops.along(arc, forward)
+        });
+        let [m, n] = [&across, &up].map(|lines| lines.len() as u32 + 1);
         let ids = grid_ids(layout, p, (m, n), &first_on_arc, out.positions.len() as u32);
-        let inner: Vec<DVec2> = (1..n)
-            .flat_map(|j| (1..m).map(move |i| (i, j)))
-            .map(|(i, j)| map.size * DVec2::new(f64::from(i) / f64::from(m), f64::from(j) / f64::from(n)))
-            .collect();
+        let inner: Vec<DVec2> =
+            up.iter().flat_map(|&v| across.iter().map(move |&u| map.size * DVec2::new(u, v))).collect();
         for (at, f) in map.locate(&inner) {
             out.positions.push(at);
             out.base_face.push(f);
@@ -106,14 +92,14 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], cou
     out
 }
 
-/// The `n − 1` points that part a vertex path into `n` pieces of equal share in the parameter given `along` it, each
-/// with a vertex near it.
-fn along_path(path: &[u32], along: &[f64], n: u32, position: impl Fn(u32) -> DVec3) -> Vec<(DVec3, u32)> {
+/// The points of a vertex path at these shares of the parameter given `along` it, each with a vertex near it.
+fn along_path(path: &[u32], along: &[f64], shares: &[f64], position: impl Fn(u32) -> DVec3) -> Vec<(DVec3, u32)> {
     let total = along[along.len() - 1];
     let mut k = 0;
-    (1..n)
-        .map(|i| {
-            let s = total * f64::from(i) / f64::from(n);
+    shares
+        .iter()
+        .map(|share| {
+            let s = total * share;
             while k + 2 < path.len() && along[k + 1] < s {
                 k += 1;
             }
@@ -176,8 +162,7 @@ mod tests {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
         assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let counts = chord_counts(&layout, &maps, target);
-        let mesh = refine(&layout, &embedding, &maps, &counts);
+        let mesh = refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, target));
         (layout, mesh)
     }
 

@@ -1,5 +1,7 @@
 //! Smoothing a quad mesh on the surface, and its quality.
 
+use glam::DVec3;
+
 use super::ground::Ground;
 use super::optimise::{Around, optimise};
 use super::rail::Rail;
@@ -15,22 +17,20 @@ const ROUNDS: usize = 10;
 /// where folds stay.
 const KEPT: f64 = 0.5;
 
-/// Scaled Jacobian of every quad: the smallest sine of its corner angles, negative where it is folded.
+/// Scaled Jacobian of every quad: see [`scaled_jacobian`].
 pub fn scaled_jacobians(mesh: &QuadMesh) -> Vec<f64> {
-    let p = |v: u32| mesh.positions[v as usize];
-    mesh.quads
-        .iter()
-        .map(|q| {
-            let n = (p(q[2]) - p(q[0])).cross(p(q[3]) - p(q[1])).normalize_or_zero();
-            (0..4)
-                .map(|k| {
-                    let o = p(q[k]);
-                    let (x, y) = (p(q[(k + 1) % 4]) - o, p(q[(k + 3) % 4]) - o);
-                    x.cross(y).dot(n) / (x.length() * y.length()).max(f64::MIN_POSITIVE)
-                })
-                .fold(f64::INFINITY, f64::min)
-        })
-        .collect()
+    mesh.quads.iter().map(|q| scaled_jacobian(mesh, q)).collect()
+}
+
+/// The smallest sine of a quad's corner angles, negative where it is folded.
+pub(super) fn scaled_jacobian(mesh: &QuadMesh, quad: &[u32; 4]) -> f64 {
+    let [a, b, c, d] = quad.map(|v| mesh.positions[v as usize]);
+    let n = (c - a).cross(d - b).normalize_or_zero();
+    let corner = |[o, x, y]: [DVec3; 3]| {
+        let (x, y) = (x - o, y - o);
+        x.cross(y).dot(n) / (x.length() * y.length()).max(f64::MIN_POSITIVE)
+    };
+    [[a, b, d], [b, c, a], [c, d, b], [d, a, c]].map(corner).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Number of folded quads and mean scaled Jacobian.

@@ -19,7 +19,7 @@ use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, TriMesh, write_obj};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{QuadMesh, chord_counts, whole_counts};
+use crate::quad::{QuadMesh, Stops, whole_counts};
 use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
@@ -207,18 +207,18 @@ pub fn finish(
         }
     };
     let done = matches!(optimised, Some(Ok(_)));
-    let counts = if done && options.integer && embedded.is_none() {
+    let stops = if done && options.integer && embedded.is_none() {
         let (counts, off) = whole_counts(&layout, &maps, edge);
         tracing::debug!(off, "patches of whole quads");
-        counts
+        Stops::even(&layout, &counts)
     } else {
         let target = match options.size {
             QuadSize::EdgeLength(_) => edge,
             QuadSize::Count(n) => edge_for_count(&maps, n),
         };
-        chord_counts(&layout, &maps, target)
+        Stops::on_surface(&layout, &maps, target)
     };
-    let quads = quads(sketch, (&layout, &embedding, &maps), done, &counts, progress)?;
+    let quads = quads(sketch, (&layout, &embedding, &maps), done, &stops, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
     Ok(Export { layout, embedding, ground: *ground, maps, quads, optimised, before, seconds })
@@ -242,7 +242,7 @@ fn edge_length(size: QuadSize, sketch: &Sketch<'_>) -> f64 {
 
 /// The edge length at which the patches' rectangles hold about `n` quads.
 fn edge_for_count(maps: &[PatchMap], n: u32) -> f64 {
-    let area: f64 = maps.iter().map(|m| m.size.x * m.size.y).sum();
+    let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
     (area / f64::from(n.max(1))).sqrt()
 }
 

@@ -1,0 +1,243 @@
+//! Where the isolines between quads cross the strips of a layout, and how many there are.
+//!
+//! All patches of a strip share the lines that run along it, so that these are chosen once for each chord. At even steps
+//! of the map a limb whose image is small would get few quads, and a map that keeps angles makes such images. Hence lines
+//! are placed where they keep edges short on the surface: least is `Σ ∫ (h_u² + h_v²) dA` with the lengths `h` of a quad's
+//! edges, for the number of quads that edges of the length wanted would make. With `L` the length on the surface of a way
+//! across the whole chord at the rate of the place, and `e(t) = ∫ L² dA` over the line at share `t` of the chord's width, the
+//! best density of lines is `e^⅓`; then the integral is `E / n²` for `n` quads across, where `E = (∫ e^⅓ dt)³`, and with
+//! `Q` quads along the strip, `n³ Q` is proportional to `E`. Directions, and so angles, are those of the map all the same.
+
+use crate::layout::{Patch, PatchMap, QuadLayout};
+
+/// Parts of a strip's width in which `e` is found: some more than quads across usual patches.
+const PARTS: usize = 32;
+/// By what factor the density of lines may differ from the mean: more would be cells many times longer than wide.
+const EXTREME: f64 = 2.0;
+/// Fewest quads across a chord: with three no two quads share two edges and none touches itself, however small the layout.
+const FEWEST: u32 = 3;
+/// Most quads across a chord.
+const MOST: f64 = 1e4;
+/// Most that rounding numbers of quads is made up for by a common factor, and halvings of the bracket of that.
+const ROUNDING: f64 = 1.5;
+const HALVINGS: usize = 24;
+/// Rounds of finding numbers of quads that depend on each other: errors fall to a third in each.
+const ROUNDS: usize = 20;
+
+/// For each chord of a layout the lines along it.
+#[derive(Debug, Clone)]
+pub struct Stops {
+    /// Of each chord the places of the lines as shares of its width, ascending, without 0 and 1.
+    of_chord: Vec<Vec<f64>>,
+    /// Whether each arc runs across its chord in the direction that these are measured in.
+    agrees: Vec<bool>,
+    /// The chord of each arc.
+    chord: Vec<u32>,
+}
+
+impl Stops {
+    /// So many quads across every chord at even steps of the map.
+    pub fn even(layout: &QuadLayout, counts: &[u32]) -> Self {
+        Self::new(layout, |_| vec![1.0; PARTS], counts)
+    }
+
+    /// Quads with edges of about length `edge` on the surface.
+    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> Self {
+        let agrees = directions(layout);
+        let density: Vec<Vec<f64>> = spread(layout, maps, &agrees).iter().map(|parts| densities(parts)).collect();
+        let cost = |d: &Vec<f64>| (d.iter().sum::<f64>() / PARTS as f64).powi(3);
+        let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
+        let counts = counts(layout, &density.iter().map(cost).collect::<Vec<f64>>(), area / (edge * edge));
+        Self::new(layout, |chord| density[chord].clone(), &counts)
+    }
+
+    fn new(layout: &QuadLayout, density: impl Fn(usize) -> Vec<f64>, counts: &[u32]) -> Self {
+        Self {
+            of_chord: counts.iter().enumerate().map(|(c, &n)| quantiles(&density(c), n)).collect(),
+            agrees: directions(layout),
+            chord: layout.arcs.iter().map(|a| a.chord).collect(),
+        }
+    }
+
+    /// The places of the lines along an arc, as shares of the whole from its first node on; from the second if it is not
+    /// to be followed `forward`.
+    pub fn along(&self, arc: u32, forward: bool) -> Vec<f64> {
+        let list = &self.of_chord[self.chord[arc as usize] as usize];
+        if self.agrees[arc as usize] == forward { list.clone() } else { list.iter().rev().map(|s| 1.0 - s).collect() }
+    }
+}
+
+/// Directs every arc across its chord such that opposite sides of a patch run the same way; tells whether that is its own
+/// direction. On a surface with two sides there is such a choice.
+fn directions(layout: &QuadLayout) -> Vec<bool> {
+    let mut across: Vec<Vec<(u32, bool)>> = vec![Vec::new(); layout.arcs.len()];
+    for patch in &layout.patches {
+        for i in 0..2 {
+            let ((a, f), (b, g)) = (patch.sides[i], patch.sides[i + 2]);
+            // Both sides are gone around the patch, hence against each other.
+            across[a as usize].push((b, f != g));
+            across[b as usize].push((a, f != g));
+        }
+    }
+    let mut agrees = vec![None; layout.arcs.len()];
+    for start in 0..agrees.len() {
+        if agrees[start].is_some() {
+            continue;
+        }
+        agrees[start] = Some(true);
+        let mut stack = vec![start];
+        while let Some(a) = stack.pop() {
+            let own = agrees[a] == Some(true);
+            for &(b, alike) in &across[a] {
+                let slot = &mut agrees[b as usize];
+                if slot.is_none() {
+                    *slot = Some(own == alike);
+                    stack.push(b as usize);
+                }
+            }
+        }
+    }
+    agrees.into_iter().map(|a| a.unwrap_or(true)).collect()
+}
+
+/// The numbers of quads across all chords that make about so many quads in `all`, given for each the integral `E`.
+fn counts(layout: &QuadLayout, cost: &[f64], all: f64) -> Vec<u32> {
+    let chords = |p: &Patch| [0, 1].map(|i| layout.arcs[p.sides[i].0 as usize].chord as usize);
+    let mut count = vec![1.0; layout.chords];
+    for _ in 0..ROUNDS {
+        let mut along = vec![0.0; layout.chords];
+        for [c, d] in layout.patches.iter().map(chords) {
+            along[c] += count[d];
+            along[d] += count[c];
+        }
+        for (n, (e, q)) in count.iter_mut().zip(cost.iter().zip(along)) {
+            *n = (e / q).cbrt();
+        }
+        let sum: f64 = layout.patches.iter().map(chords).map(|[c, d]| count[c] * count[d]).sum();
+        count.iter_mut().for_each(|n| *n = (*n * (all / sum).sqrt()).clamp(1.0, MOST));
+    }
+    // Rounded they make another number in all; a common factor makes up for that.
+    let rounded = |by: f64| count.iter().map(|n| ((n * by).round() as u32).max(FEWEST)).collect::<Vec<u32>>();
+    let made = |by: f64| {
+        let n = rounded(by);
+        layout.patches.iter().map(chords).map(|[c, d]| f64::from(n[c]) * f64::from(n[d])).sum::<f64>()
+    };
+    let (mut few, mut many) = (1.0 / ROUNDING, ROUNDING);
+    for _ in 0..HALVINGS {
+        let by = 0.5 * (few + many);
+        *(if made(by) < all { &mut few } else { &mut many }) = by;
+    }
+    let nearest = [few, many].into_iter().min_by(|x, y| (made(*x) - all).abs().total_cmp(&(made(*y) - all).abs()));
+    rounded(nearest.unwrap_or(1.0))
+}
+
+/// For each chord the integrals of `L²` over parts of its width, all along the strip.
+fn spread(layout: &QuadLayout, maps: &[PatchMap], agrees: &[bool]) -> Vec<[f64; PARTS]> {
+    let mut sums = vec![[0.0; PARTS]; layout.chords];
+    for (patch, map) in layout.patches.iter().zip(maps) {
+        for axis in 0..2 {
+            let (arc, forward) = patch.sides[axis];
+            let agrees = agrees[arc as usize] == forward;
+            let parts = &mut sums[layout.arcs[arc as usize].chord as usize];
+            each_step(map, axis, |corners, length, area| {
+                let corners = if agrees { corners } else { corners.map(|t| 1.0 - t) };
+                let mut below = 0.0;
+                for (k, sum) in parts.iter_mut().enumerate() {
+                    let next = share_below(corners, (k + 1) as f64 / PARTS as f64);
+                    *sum += length * length * area * (next - below);
+                    below = next;
+                }
+            });
+        }
+    }
+    sums
+}
+
+/// The share of a triangle's area where a coordinate, given at its corners, is below a value.
+fn share_below(mut corners: [f64; 3], value: f64) -> f64 {
+    corners.sort_unstable_by(f64::total_cmp);
+    let [low, middle, high] = corners;
+    if value <= low {
+        0.0
+    } else if value < middle {
+        (value - low).powi(2) / ((middle - low) * (high - low))
+    } else if value < high {
+        1.0 - (high - value).powi(2) / ((high - low) * (high - middle))
+    } else {
+        1.0
+    }
+}
+
+/// Shows every triangle of a patch: one coordinate of its corners, as shares of the whole; the length
+/// on the surface of the whole way at its rate; and its area on the surface.
+fn each_step(map: &PatchMap, axis: usize, mut visit: impl FnMut([f64; 3], f64, f64)) {
+    for f in map.mesh.faces() {
+        let corners = map.mesh.face_vertices(f);
+        let [p, q, r] = corners.map(|v| map.mesh.position(v));
+        let [a, b, c] = corners.map(|v| map.uv[v.index()]);
+        let image = (b - a).perp_dot(c - a);
+        let other = 1 - axis;
+        let along = ((q - p) * (c - a)[other] - (r - p) * (b - a)[other]) / image;
+        let length = along.length() * map.size[axis];
+        if image > 0.0 && length.is_finite() {
+            let shares = [a, b, c].map(|w| (w[axis] / map.size[axis]).clamp(0.0, 1.0));
+            visit(shares, length, map.mesh.face_area(f));
+        }
+    }
+}
+
+/// The best density of lines in all parts of a chord; in those without anything it is the mean, and nowhere extreme.
+fn densities(parts: &[f64]) -> Vec<f64> {
+    let best: Vec<f64> = parts.iter().map(|e| (e * PARTS as f64).cbrt()).collect();
+    let some: Vec<f64> = best.iter().copied().filter(|d| *d > 0.0).collect();
+    let mean = some.iter().sum::<f64>() / some.len().max(1) as f64;
+    if !(mean > 0.0 && mean.is_finite()) {
+        return vec![1.0; parts.len()];
+    }
+    best.iter().map(|&d| if d > 0.0 { d.clamp(mean / EXTREME, mean * EXTREME) } else { mean }).collect()
+}
+
+/// The places that part a way into `n` of equal length, where lines are as dense in its parts as given.
+fn quantiles(density: &[f64], n: u32) -> Vec<f64> {
+    let total: f64 = density.iter().sum();
+    let (mut part, mut before) = (0, 0.0);
+    let place = |i: u32| {
+        let want = total * f64::from(i) / f64::from(n);
+        while part + 1 < density.len() && before + density[part] < want {
+            before += density[part];
+            part += 1;
+        }
+        (part as f64 + ((want - before) / density[part]).clamp(0.0, 1.0)) / density.len() as f64
+    };
+    (1..n).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_a_triangle_are_those_of_its_area() {
+        let corners = [0.7, 0.1, 0.4];
+        // By many points of the triangle.
+        let n = 400;
+        let points = (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j)));
+        let at = |(i, j): (usize, usize)| {
+            let [x, y] = [i, j].map(|k| (k as f64 + 1.0 / 3.0) / n as f64);
+            corners[0] + (corners[1] - corners[0]) * x + (corners[2] - corners[0]) * y
+        };
+        let all: Vec<f64> = points.map(at).collect();
+        for value in [0.0, 0.2, 0.4, 0.55, 0.9] {
+            let counted = all.iter().filter(|t| **t < value).count() as f64 / all.len() as f64;
+            assert!((share_below(corners, value) - counted).abs() < 0.01, "{value}");
+        }
+    }
+
+    #[test]
+    fn lines_are_dense_where_they_are_to_be() {
+        let places = quantiles(&[1.0, 1.0, 2.0, 4.0], 8);
+        let expected = [0.25, 0.5, 0.625, 0.75, 0.8125, 0.875, 0.9375];
+        assert!(places.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{places:?}");
+        assert!(quantiles(&[1.0; PARTS], 1).is_empty());
+    }
+}

@@ -57,7 +57,9 @@ pub(super) fn interpolate_vectors(
             free.push(f);
         }
     }
-    let (matrix, rhs) = assemble(mesh, metric, hard, pull, &index, &free);
+    let density = (REACH * REACH).recip();
+    let assembled = |density: f64| assemble(mesh, metric, hard, pull, (&index, &free), density);
+    let ((matrix, rhs), (heavy, _)) = rayon::join(|| assembled(0.0), || assembled(density));
     progress.check()?;
     let symbolic = SpdSymbolic::new(&matrix)?;
     progress.check()?;
@@ -72,8 +74,6 @@ pub(super) fn interpolate_vectors(
             Ok(factor.solve(&matrix, &rhs)?)
         }
     };
-    let density = (REACH * REACH).recip();
-    let heavy = with_mass(&matrix, &mass, density);
     let (z, heavy_factor) = rayon::join(harmonic, || symbolic.factor(&heavy));
     let (mut z, heavy_factor) = (z?, heavy_factor?);
     for _ in 0..STEPS {
@@ -92,14 +92,14 @@ fn unit(z: c64) -> c64 {
     if norm > f64::MIN_POSITIVE && norm.is_finite() { z / norm } else { c64::new(1.0, 0.0) }
 }
 
-/// The system of the free triangles.
+/// The system of the free triangles, with a mass of `density` per area added.
 fn assemble(
     mesh: &TriMesh,
     metric: &Metric,
     hard: &[Option<c64>],
     pull: &Pull,
-    index: &[u32],
-    free: &[FaceId],
+    (index, free): (&[u32], &[FaceId]),
+    density: f64,
 ) -> (SparseHermitian<c64>, Vec<c64>) {
     let mean = mesh.faces().map(|f| metric.area(f)).sum::<f64>() / mesh.n_faces().max(1) as f64;
     let mut triplets = Vec::with_capacity(4 * free.len());
@@ -112,7 +112,7 @@ fn assemble(
         }
         // At least some ground for the smallest triangle, or its row might vanish.
         let ground = GROUND * (area / mean).clamp(1e-3, 1e3);
-        triplets.push((i as u32, i as u32, c64::new(ground + strength, 0.0)));
+        triplets.push((i as u32, i as u32, c64::new(ground + strength + density * area, 0.0)));
     }
     for e in mesh.edges() {
         let h = mesh.halfedge(e);
@@ -132,17 +132,6 @@ fn assemble(
         }
     }
     (SparseHermitian::from_triplets(free.len(), &triplets), rhs)
-}
-
-/// The same system with so much of a mass added.
-fn with_mass(matrix: &SparseHermitian<c64>, mass: &[f64], density: f64) -> SparseHermitian<c64> {
-    let mut heavy = matrix.clone();
-    for (value, (row, column, _)) in heavy.values_mut().iter_mut().zip(matrix.entries()) {
-        if row == column {
-            *value += c64::new(density * mass[row as usize], 0.0);
-        }
-    }
-    heavy
 }
 
 /// The weight of the edge of `h` and its twin: length over distance of the centres, within bounds.

@@ -9,11 +9,15 @@
 //! `Q` quads along the strip, `n³ Q` is proportional to `E`. Directions, and so angles, are those of the map all the same.
 
 use crate::layout::{Patch, PatchMap, QuadLayout};
+use crate::mesh::FaceId;
 
 /// Parts of a strip's width in which `e` is found: some more than quads across usual patches.
 const PARTS: usize = 32;
 /// By what factor the density of lines may differ from the mean: more would be cells many times longer than wide.
 const EXTREME: f64 = 2.0;
+/// By what factor a way across a patch may be longer than the mean: a triangle whose image is next to nothing says nothing
+/// of lines that miss it.
+const LONGEST: f64 = 4.0;
 /// Fewest quads across a chord: with three no two quads share two edges and none touches itself, however small the layout.
 const FEWEST: u32 = 3;
 /// Most quads across a chord.
@@ -168,20 +172,26 @@ fn share_below(mut corners: [f64; 3], value: f64) -> f64 {
     }
 }
 
-/// Shows every triangle of a patch: one coordinate of its corners, as shares of the whole; the length
-/// on the surface of the whole way at its rate; and its area on the surface.
+/// Shows every triangle of a patch: one coordinate of its corners, as shares of the whole; the length on the surface of the
+/// whole way at its rate; and its area on the surface.
 fn each_step(map: &PatchMap, axis: usize, mut visit: impl FnMut([f64; 3], f64, f64)) {
-    for f in map.mesh.faces() {
+    let other = 1 - axis;
+    let step = |f: FaceId| {
         let corners = map.mesh.face_vertices(f);
         let [p, q, r] = corners.map(|v| map.mesh.position(v));
         let [a, b, c] = corners.map(|v| map.uv[v.index()]);
         let image = (b - a).perp_dot(c - a);
-        let other = 1 - axis;
         let along = ((q - p) * (c - a)[other] - (r - p) * (b - a)[other]) / image;
         let length = along.length() * map.size[axis];
-        if image > 0.0 && length.is_finite() {
-            let shares = [a, b, c].map(|w| (w[axis] / map.size[axis]).clamp(0.0, 1.0));
-            visit(shares, length, map.mesh.face_area(f));
+        let shares = [a, b, c].map(|w| (w[axis] / map.size[axis]).clamp(0.0, 1.0));
+        (image > 0.0 && length.is_finite()).then_some((shares, length, image))
+    };
+    let sum = |(s, t): (f64, f64), (_, length, image): ([f64; 3], f64, f64)| (s + length * image, t + image);
+    let (total, images) = map.mesh.faces().filter_map(step).fold((0.0, 0.0), sum);
+    let longest = LONGEST * total / images;
+    for f in map.mesh.faces() {
+        if let Some((shares, length, _)) = step(f) {
+            visit(shares, length.min(longest), map.mesh.face_area(f));
         }
     }
 }

@@ -9,7 +9,7 @@ mod smooth;
 mod stops;
 mod worst;
 
-pub use refine::{QuadMesh, refine, whole_counts};
+pub use refine::{QuadMesh, refine};
 pub use smooth::{land, quality, scaled_jacobians, smooth};
-pub use stops::Stops;
+pub use stops::{Stops, whole_counts};
 pub use worst::{Held, mend};

@@ -27,22 +27,6 @@ pub struct QuadMesh {
     pub arcs: Vec<Vec<u32>>,
 }
 
-/// The number of quads across every chord where all chords are multiples of `edge` in the maps, and by what share of an
-/// edge some chord is off at most.
-pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
-    let mut counts = vec![1; layout.chords];
-    let mut off = 0.0f64;
-    for (p, map) in layout.patches.iter().zip(maps) {
-        for (i, length) in [(0, map.size.x), (1, map.size.y)] {
-            let chord = layout.arcs[p.sides[i].0 as usize].chord as usize;
-            let count = (length / edge).round().clamp(1.0, 1e4);
-            off = off.max((length / edge - count).abs());
-            counts[chord] = count as u32;
-        }
-    }
-    (counts, off)
-}
-
 /// Refines every patch to the grid of the lines along its two chords.
 pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], stops: &Stops) -> QuadMesh {
     let position = |v: u32| embedding.mesh.positions[v as usize];
@@ -162,7 +146,7 @@ mod tests {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
         assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let mesh = refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, target));
+        let mesh = refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, whole / (target * target)));
         (layout, mesh)
     }
 

@@ -3,7 +3,7 @@
 //! All patches of a strip share the lines that run along it, so that these are chosen once for each chord. At even steps
 //! of the map a limb whose image is small would get few quads, and a map that keeps angles makes such images. Hence lines
 //! are placed where they keep edges short on the surface: least is `Σ ∫ (h_u² + h_v²) dA` with the lengths `h` of a quad's
-//! edges, for the number of quads that edges of the length wanted would make. With `L` the length on the surface of a way
+//! edges, for the number of quads wanted. With `L` the length on the surface of a way
 //! across the whole chord at the rate of the place, and `e(t) = ∫ L² dA` over the line at share `t` of the chord's width, the
 //! best density of lines is `e^⅓`; then the integral is `E / n²` for `n` quads across, where `E = (∫ e^⅓ dt)³`, and with
 //! `Q` quads along the strip, `n³ Q` is proportional to `E`. Directions, and so angles, are those of the map all the same.
@@ -42,23 +42,22 @@ pub struct Stops {
 impl Stops {
     /// So many quads across every chord at even steps of the map.
     pub fn even(layout: &QuadLayout, counts: &[u32]) -> Self {
-        Self::new(layout, |_| vec![1.0; PARTS], counts)
+        Self::new(layout, directions(layout), &vec![vec![1.0; PARTS]; counts.len()], counts)
     }
 
-    /// Quads with edges of about length `edge` on the surface.
-    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> Self {
+    /// About so many quads in all, of edges as even on the surface as can be.
+    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], quads: f64) -> Self {
         let agrees = directions(layout);
         let density: Vec<Vec<f64>> = spread(layout, maps, &agrees).iter().map(|parts| densities(parts)).collect();
         let cost = |d: &Vec<f64>| (d.iter().sum::<f64>() / PARTS as f64).powi(3);
-        let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
-        let counts = counts(layout, &density.iter().map(cost).collect::<Vec<f64>>(), area / (edge * edge));
-        Self::new(layout, |chord| density[chord].clone(), &counts)
+        let counts = counts(layout, &density.iter().map(cost).collect::<Vec<f64>>(), quads);
+        Self::new(layout, agrees, &density, &counts)
     }
 
-    fn new(layout: &QuadLayout, density: impl Fn(usize) -> Vec<f64>, counts: &[u32]) -> Self {
+    fn new(layout: &QuadLayout, agrees: Vec<bool>, density: &[Vec<f64>], counts: &[u32]) -> Self {
         Self {
-            of_chord: counts.iter().enumerate().map(|(c, &n)| quantiles(&density(c), n)).collect(),
-            agrees: directions(layout),
+            of_chord: density.iter().zip(counts).map(|(density, &n)| quantiles(density, n)).collect(),
+            agrees,
             chord: layout.arcs.iter().map(|a| a.chord).collect(),
         }
     }
@@ -69,6 +68,22 @@ impl Stops {
         let list = &self.of_chord[self.chord[arc as usize] as usize];
         if self.agrees[arc as usize] == forward { list.clone() } else { list.iter().rev().map(|s| 1.0 - s).collect() }
     }
+}
+
+/// The number of quads across every chord where all chords are multiples of `edge` in the maps, and by what share of an
+/// edge some chord is off at most.
+pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
+    let mut counts = vec![1; layout.chords];
+    let mut off = 0.0f64;
+    for (p, map) in layout.patches.iter().zip(maps) {
+        for (i, length) in [(0, map.size.x), (1, map.size.y)] {
+            let chord = layout.arcs[p.sides[i].0 as usize].chord as usize;
+            let count = (length / edge).round().clamp(1.0, 1e4);
+            off = off.max((length / edge - count).abs());
+            counts[chord] = count as u32;
+        }
+    }
+    (counts, off)
 }
 
 /// Directs every arc across its chord such that opposite sides of a patch run the same way; tells whether that is its own

@@ -212,11 +212,12 @@ pub fn finish(
         tracing::debug!(off, "patches of whole quads");
         Stops::even(&layout, &counts)
     } else {
-        let target = match options.size {
-            QuadSize::EdgeLength(_) => edge,
-            QuadSize::Count(n) => edge_for_count(&maps, n),
+        let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
+        let number = match options.size {
+            QuadSize::EdgeLength(_) => area / (edge * edge),
+            QuadSize::Count(n) => f64::from(n),
         };
-        Stops::on_surface(&layout, &maps, target)
+        Stops::on_surface(&layout, &maps, number)
     };
     let quads = quads(sketch, (&layout, &embedding, &maps), done, &stops, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
@@ -238,12 +239,6 @@ fn edge_length(size: QuadSize, sketch: &Sketch<'_>) -> f64 {
         QuadSize::EdgeLength(length) => length / sketch.units.scale,
         QuadSize::Count(n) => (mesh.faces().map(|f| mesh.face_area(f)).sum::<f64>() / f64::from(n.max(1))).sqrt(),
     }
-}
-
-/// The edge length at which the patches' rectangles hold about `n` quads.
-fn edge_for_count(maps: &[PatchMap], n: u32) -> f64 {
-    let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
-    (area / f64::from(n.max(1))).sqrt()
 }
 
 impl Export {

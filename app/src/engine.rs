@@ -11,6 +11,7 @@ use glam::DVec3;
 use plait_core::mesh::TriMesh;
 use plait_core::progress::{Cancelled, Progress};
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
+use plait_core::weave::ElasticEnergy;
 use thiserror::Error;
 
 /// Why the engine did not do what it was asked.
@@ -95,6 +96,8 @@ pub struct Proposal {
     pub curve: SurfaceCurve,
     /// The lower, the better.
     pub cost: f64,
+    /// Its elastic energy as it was found and as it is proposed, if it was a loop of the graph.
+    pub energy: Option<ElasticEnergy>,
     /// The spine in space; a closed one does not repeat its first point.
     pub polyline: Vec<DVec3>,
 }

@@ -80,6 +80,12 @@ fn absolute(path: &Path) -> std::path::PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
+/// A proposal as the window shows it.
+fn proposal(model: &weave::Model, proposal: weave::Proposal) -> Proposal {
+    let polyline = model.shown(&proposal.curve);
+    Proposal { curve: proposal.curve, cost: proposal.cost, energy: proposal.energy, polyline }
+}
+
 fn plain(error: impl Into<WeaveError>) -> EngineError {
     failed(error.into(), None)
 }
@@ -162,11 +168,6 @@ impl SessionEngine {
         self.refresh();
         Ok(value)
     }
-
-    fn proposal(&self, proposal: weave::Proposal) -> Proposal {
-        let polyline = self.session.model().shown(&proposal.curve);
-        Proposal { curve: proposal.curve, cost: proposal.cost, polyline }
-    }
 }
 
 impl Engine for SessionEngine {
@@ -177,13 +178,13 @@ impl Engine for SessionEngine {
         progress: &Progress,
     ) -> Result<Vec<Proposal>, EngineError> {
         let model = Arc::clone(self.session.model());
-        let shown = |p: weave::Proposal| Proposal { polyline: model.shown(&p.curve), curve: p.curve, cost: p.cost };
-        let found = self.session.proposals_with(at, progress, |p| first(shown(p)));
-        Ok(found.map_err(plain)?.into_iter().map(|p| self.proposal(p)).collect())
+        let found = self.session.proposals_with(at, progress, |p| first(proposal(&model, p)));
+        Ok(found.map_err(plain)?.into_iter().map(|p| proposal(&model, p)).collect())
     }
 
     fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError> {
-        let proposal = weave::Proposal { curve: proposal.curve.clone(), cost: proposal.cost };
+        let Proposal { curve, cost, energy, .. } = proposal.clone();
+        let proposal = weave::Proposal { curve, cost, energy };
         let placed = self.session.place(proposal, progress);
         self.changed(placed).map(|id| StripId(id.0))
     }
@@ -212,7 +213,7 @@ impl Engine for SessionEngine {
         // A valid layout first; then corners of the shape are told apart.
         let goal = if self.session.woven().count(Colour::Red) > 0 { Goal::Valid } else { Goal::Separated };
         let found = self.session.suggest(goal, progress).map_err(|e| failed(e, Some(&self.session)))?;
-        Ok(self.proposal(found))
+        Ok(proposal(self.session.model(), found))
     }
 
     fn scene(&self) -> Arc<Scene> {

@@ -8,7 +8,7 @@ use super::action::{Action, ViewOption};
 use super::icons::{self, Icon};
 use super::messages::{Message, Tone};
 use super::{PlaitApp, detail, embedding, theme};
-use crate::engine::{LayoutPart, Remark, Scene, Source, Strip};
+use crate::engine::{LayoutPart, Proposal, Remark, Scene, Source, Strip};
 use crate::shading::{self, region_rgb};
 
 const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
@@ -419,9 +419,19 @@ fn status(app: &PlaitApp, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(RichText::new(hint).size(13.0).color(theme::QUIET));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new("? shows the shortcuts").size(13.0).color(theme::QUIET));
+            let figures = app.hover.shown().map(proposal_figures);
+            let text = figures.unwrap_or_else(|| "? shows the shortcuts".into());
+            ui.label(RichText::new(text).size(13.0).color(theme::QUIET));
         });
     });
+}
+
+/// What the strip under the pointer costs, and what smoothing it came to.
+fn proposal_figures(proposal: &Proposal) -> String {
+    match proposal.energy {
+        Some(e) => format!("Cost {:.2} · length and bending {:.2}, smoothed {:.2}", proposal.cost, e.found, e.now),
+        None => format!("Cost {:.2}", proposal.cost),
+    }
 }
 
 /// Messages, progress and dialogs over the view.

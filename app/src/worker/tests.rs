@@ -65,7 +65,7 @@ impl Engine for Fake {
             return Err(until_cancelled(progress));
         }
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
-        Ok(vec![Proposal { curve, cost: at.face.index() as f64, polyline: Vec::new() }])
+        Ok(vec![Proposal { curve, cost: at.face.index() as f64, energy: None, polyline: Vec::new() }])
     }
     fn place(&mut self, _: &Proposal, _: &Progress) -> Result<StripId, EngineError> {
         Ok(StripId(0))

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::model::Options;
+use super::proposal::ElasticEnergy;
 use crate::mesh::{MeshSource, TriMesh, fingerprint};
 use crate::surface::SurfaceCurve;
 
@@ -26,6 +27,9 @@ pub struct Strip {
     pub on_proxy: Option<SurfaceCurve>,
     /// Cost of the loop when it was found.
     pub cost: f64,
+    /// Its elastic energy when it was placed, if it was a loop of the graph.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub energy: Option<ElasticEnergy>,
     /// Whether it is drawn.
     pub visible: bool,
 }

@@ -9,7 +9,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::session::Proposal;
+use super::proposal::Proposal;
 use crate::dual::{Arrangement, Cost, Mark, next};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
@@ -67,7 +67,7 @@ pub(super) fn detours(arrangement: &Arrangement, base: &TriMesh, root: u32, max:
     let curves = list.into_iter().filter_map(|(length, closing)| {
         let walk = tree.walk(arrangement, closing);
         let curve = on_base(arrangement, base, &walk, matches!(closing, Closing::Loop(_)))?;
-        Some(Proposal { curve, cost: PRICE * length })
+        Some(Proposal { curve, cost: PRICE * length, energy: None })
     });
     curves.take(max).collect()
 }

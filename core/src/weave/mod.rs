@@ -10,6 +10,7 @@ mod export;
 mod ground;
 mod layout;
 mod model;
+mod proposal;
 mod quads;
 mod recent;
 mod report;
@@ -26,9 +27,10 @@ pub use export::{Export, ExportOptions, QuadSize, Shortest, Sketch, Watch, expor
 pub use ground::Ground;
 pub use layout::OpenedLayout;
 pub use model::{Model, Options};
+pub use proposal::{ElasticEnergy, Proposal};
 pub use report::{Before, Times};
 pub use script::{Script, ScriptError, Step, replay};
-pub use session::{Proposal, Session, WeaveError};
+pub use session::{Session, WeaveError};
 pub use suggest::{Goal, Stuck};
 pub use woven::Woven;
 

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::design::Strip;
 use super::export::{Export, write_file};
 use super::ground::Ground;
+use super::proposal::ElasticEnergy;
 use super::session::{Session, WeaveError};
 use crate::dual::{Colour, RegionReport};
 use crate::embed::{CollapsedChord, FeatureEdges, Measures, ShortChord, Surface, face_curvature, measure_patches};
@@ -96,6 +97,7 @@ struct StripReport {
     closed: bool,
     length: f64,
     cost: f64,
+    energy: Option<ElasticEnergy>,
 }
 
 #[derive(Serialize)]
@@ -216,6 +218,7 @@ fn weaving_report(session: &Session, embedded: bool) -> Weaving<'_> {
         closed: s.curve.closed,
         length: s.curve.length(&model.loaded.mesh) * scale,
         cost: s.cost,
+        energy: s.energy,
     };
     Weaving {
         proxy: model.proxy.as_ref().map(|p| ProxySection { triangles: p.mesh().n_faces(), embedded }),

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::model::Options;
-use super::session::{Proposal, Session, WeaveError};
+use super::proposal::Proposal;
+use super::session::{Session, WeaveError};
 use super::suggest::{Goal, Stuck};
 use crate::mesh::{LoadError, MeshSource};
 use crate::progress::Progress;

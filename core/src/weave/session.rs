@@ -2,25 +2,25 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::design::{Design, DesignError, Pin, Strip, StripId};
 use super::ground::alike;
 use super::model::{Model, Options};
+use super::proposal::{Proposal, polished};
 use super::recent::RecentSearches;
 use super::suggest::Stuck;
 use super::woven::Woven;
 use crate::dual::{Arrangement, ArrangementError};
-use crate::elastica::{Certainty, ElasticaError, ElasticaGraph, FoundLoop};
+use crate::elastica::{Certainty, ElasticaError, FoundLoop};
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
 use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
-use crate::mesh::{LoadError, LoadedMesh, MeshSource, TriMesh, fingerprint};
+use crate::mesh::{LoadError, LoadedMesh, MeshSource, fingerprint};
 use crate::progress::{Cancelled, Progress};
 use crate::proxy::CarryError;
-use crate::surface::{Anchor, RelaxOptions, SurfaceCurve, SurfacePoint, relax};
+use crate::surface::{SurfaceCurve, SurfacePoint};
 
 /// Whatever can go wrong while weaving.
 #[derive(Debug, Error)]
@@ -89,22 +89,6 @@ pub enum WeaveError {
         /// What the system says.
         source: std::io::Error,
     },
-}
-
-/// A strip that could be placed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Proposal {
-    /// Its spine, on the mesh that is woven on.
-    pub curve: SurfaceCurve,
-    /// Cost of the loop that was found.
-    pub cost: f64,
-}
-
-impl Proposal {
-    /// The spine as points in space; `mesh` is the one that is woven on.
-    pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
-        self.curve.points(mesh)
-    }
 }
 
 /// A state of the history: strips, and the pins that were set while they were there.
@@ -238,7 +222,7 @@ impl Session {
         let polished = |l: &FoundLoop| polished(graph, l, at, progress);
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
-            Certainty::Found => first(Proposal { curve: l.curve.clone(), cost: l.cost }),
+            Certainty::Found => first(Proposal::found(l)),
             Certainty::Proved => {
                 let smooth = polished(l);
                 if let Ok(smooth) = &smooth {
@@ -265,7 +249,7 @@ impl Session {
         let mut strips = self.design.strips.clone();
         let curve = self.model.to_design(&proposal.curve)?;
         let on_proxy = self.model.proxy.is_some().then_some(proposal.curve);
-        strips.push(Strip { id, curve, on_proxy, cost: proposal.cost, visible: true });
+        strips.push(Strip { id, curve, on_proxy, cost: proposal.cost, energy: proposal.energy, visible: true });
         self.change(strips, progress)?;
         self.next_id += 1;
         Ok(id)
@@ -385,23 +369,4 @@ fn on_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError
     let here = Arrangement::sketch(&model.mesh, design.strips.iter().map(Strip::woven))?;
     let there = Arrangement::sketch(original, design.strips.iter().map(|s| &s.curve))?;
     Ok(alike(&here, &there))
-}
-
-/// A found loop, relaxed to a smooth curve that still passes `at`.
-fn polished(
-    graph: &ElasticaGraph,
-    found: &FoundLoop,
-    at: SurfacePoint,
-    progress: &Progress,
-) -> Result<Proposal, WeaveError> {
-    let options = RelaxOptions { anchors: vec![Anchor::Point(at)], ..Default::default() };
-    let curve = match relax(graph.mesh(), &found.curve, &options, progress) {
-        Ok(relaxed) => relaxed.curve,
-        Err(error) => {
-            progress.check()?;
-            tracing::debug!(%error, "a loop is shown as found");
-            found.curve.clone()
-        }
-    };
-    Ok(Proposal { curve, cost: found.cost })
 }

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::detour::detours;
-use super::session::{Proposal, Session, WeaveError};
+use super::proposal::Proposal;
+use super::session::{Session, WeaveError};
 use crate::dual::{Colour, Finding, RegionReport, assess};
 use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
 use crate::mesh::VertexId;
@@ -127,7 +128,7 @@ impl Session {
         progress.check()?;
         let Ok(relaxed) = relaxed else { return Ok(proposal) };
         let helps = self.gain(&relaxed.curve, before, goal).is_some();
-        Ok(if helps { Proposal { curve: relaxed.curve, cost: proposal.cost } } else { proposal })
+        Ok(if helps { proposal.relaxed(relaxed) } else { proposal })
     }
 
     /// By how much a curve would reduce the deficit, if it would and can be placed.
@@ -169,7 +170,7 @@ impl Session {
                     let query =
                         ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
                     let found = graph.proposals(&query, &mut work, progress)?;
-                    list.extend(found.loops.into_iter().map(|l| Proposal { curve: l.curve, cost: l.cost }));
+                    list.extend(found.loops.iter().map(Proposal::found));
                 }
                 Ok(list)
             })

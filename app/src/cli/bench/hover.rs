@@ -25,6 +25,11 @@ const BEST: &str = "the best loop, relaxed";
 /// What the window does: the first loop, then all alternatives, relaxed.
 const ALL: &str = "all proposals, relaxed";
 
+/// Elastic energy of the best loop as the search found it.
+pub(super) const ENERGY: &str = "length and bending of the best loop";
+/// And of the curve that is proposed.
+pub(super) const RELAXED: &str = "the same, relaxed";
+
 /// Points of one stroke of the pointer.
 const STROKE: usize = 25;
 /// Distance between them, for a surface of bounding-box diagonal 1: some pixels of a window.
@@ -140,6 +145,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
     let strokes = arguments.points.div_ceil(STROKE);
     let moving: Vec<SurfacePoint> =
         (0..strokes).flat_map(|_| points.stroke(mesh, &metric, STROKE, STEP)).take(arguments.points).collect();
+    let (mut before, mut after) = (Vec::new(), Vec::new());
     for (name, list) in [("pointer", apart), ("moving pointer", moving)] {
         let (mut shown, mut proved, mut all) = (Vec::new(), Vec::new(), Vec::new());
         let progress = Progress::new();
@@ -147,7 +153,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
         for at in list {
             let now = Instant::now();
             let (mut first, mut best) = (None, None);
-            session.proposals_with(at, &progress, |proposal| {
+            let proposals = session.proposals_with(at, &progress, |proposal| {
                 drop(model.shown(&proposal.curve));
                 best = Some(now.elapsed());
                 first = first.or(best);
@@ -155,6 +161,10 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
             all.push(now.elapsed());
             shown.extend(first);
             proved.extend(best);
+            if let Some(energy) = proposals.first().and_then(|p| p.energy) {
+                before.push(energy.found);
+                after.push(energy.now);
+            }
             if start.elapsed() > arguments.limit() {
                 break;
             }
@@ -162,6 +172,10 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
         report.add_times(group, &format!("{name}: {SHOWN}"), &shown);
         report.add_times(group, &format!("{name}: {BEST}"), &proved);
         report.add_times(group, &format!("{name}: {ALL}"), &all);
+    }
+    let share = before.iter().zip(&after).map(|(before, after)| after / before).collect();
+    for (what, values) in [(ENERGY, before), (RELAXED, after), ("the same, relaxed / found", share)] {
+        report.add(group, what, Unit::Number, values);
     }
     Ok(())
 }

@@ -97,7 +97,7 @@ impl Engine for Session {
     }
     fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
-        Ok(Proposal { curve, cost: 1.0, polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2] })
+        Ok(Proposal { curve, energy: None, cost: 1.0, polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2] })
     }
     fn set_detail(&mut self, _: Detail, _: &Progress) -> Result<(), EngineError> {
         Ok(())

@@ -16,5 +16,5 @@ pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
 #[cfg(test)]
 pub(crate) use relax::testing;
-pub use relax::{Alignment, Anchor, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
+pub use relax::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
 pub use straightest::{PolarMap, Trace, straightest};

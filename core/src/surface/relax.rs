@@ -31,15 +31,6 @@ pub(super) use strip::{Side, spokes_across};
 /// Penalty of a direction: triangle and unit tangent in it → `q` of (8.1), not negative.
 pub type Alignment<'a> = dyn Fn(FaceId, DVec3) -> f64 + Sync + 'a;
 
-/// A place at which the curve is held.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Anchor {
-    /// The crossing at this position in the list.
-    Crossing(usize),
-    /// The crossing nearest to a point.
-    Point(SurfacePoint),
-}
-
 /// What [`relax`] minimises and how far it may go.
 #[derive(Clone)]
 pub struct RelaxOptions<'a> {
@@ -55,8 +46,8 @@ pub struct RelaxOptions<'a> {
     pub tube: f64,
     /// Crossings stay in `[t_min, 1 − t_min]` of their edges; between 0 and 0.5.
     pub t_min: f64,
-    /// Where the curve is held; exactly, up to `t_min` of an edge.
-    pub anchors: Vec<Anchor>,
+    /// Points that the curve passes, up to a fraction of an edge; it passes smoothly, whatever vertices are near.
+    pub through: Vec<SurfacePoint>,
     /// Number of times at most that the curve slides and then passes vertices.
     pub rounds: usize,
     /// Number of times that the vertices still pushed against are then tried one by one. 0 takes about half the
@@ -73,9 +64,9 @@ impl Default for RelaxOptions<'_> {
             fidelity: 1.0,
             tube: 2.5,
             t_min: 0.03,
-            anchors: Vec::new(),
+            through: Vec::new(),
             rounds: 8,
-            trials: 4,
+            trials: 10,
         }
     }
 }
@@ -98,8 +89,6 @@ pub struct CurveCost {
 pub struct Relaxed {
     /// The curve; a closed one starts near where the original started.
     pub curve: SurfaceCurve,
-    /// Where the anchors are now: positions in its list of crossings, in the order of the options.
-    pub anchors: Vec<usize>,
     /// Cost of the original curve.
     pub before: CurveCost,
     /// Cost of the curve.
@@ -118,12 +107,6 @@ pub enum RelaxError {
     /// The curve is not one on this mesh.
     #[error(transparent)]
     Curve(#[from] CurveError),
-    /// An anchor names a crossing that the curve does not have.
-    #[error("anchor {anchor} names a crossing that the curve does not have")]
-    UnknownAnchor {
-        /// Position in the list of anchors.
-        anchor: usize,
-    },
     /// A distance from the vertices that leaves nothing of an edge, or none.
     #[error("crossings cannot keep {t_min} of an edge from its ends")]
     VertexDistance {
@@ -163,7 +146,7 @@ fn strip_cost(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &Strip) -> Curv
 ///
 /// # Errors
 ///
-/// A curve that is not one on `mesh`, an anchor beyond its crossings, a senseless `t_min`, or [`Cancelled`].
+/// A curve that is not one on `mesh`, a senseless `t_min`, or [`Cancelled`].
 pub fn relax(
     mesh: &TriMesh,
     curve: &SurfaceCurve,
@@ -174,11 +157,7 @@ pub fn relax(
     if !(options.t_min > 0.0 && options.t_min < 0.5) {
         return Err(RelaxError::VertexDistance { t_min: options.t_min });
     }
-    let held = anchor_crossings(mesh, curve, &options.anchors)?;
     let mut strip = Strip::new(curve);
-    for &i in &held {
-        strip.nodes[i].held = Some(i);
-    }
     let before = strip_cost(mesh, options, &strip);
     let original = Original::new(mesh, &strip, options);
     for node in &mut strip.nodes {
@@ -212,31 +191,11 @@ pub fn relax(
     let after = best.cost;
     let result = best.strip.filter(|s| after.total < before.total && s.curve().check(mesh).is_ok());
     Ok(match result {
-        Some(strip) => original.finish(mesh, strip, &held, before, after, passed),
-        None => Relaxed {
-            curve: curve.clone(),
-            anchors: held,
-            before,
-            after: before,
-            max_displacement: 0.0,
-            passed: 0,
-            improved: false,
-        },
+        Some(strip) => original.finish(mesh, strip, before, after, passed),
+        None => {
+            Relaxed { curve: curve.clone(), before, after: before, max_displacement: 0.0, passed: 0, improved: false }
+        }
     })
-}
-
-fn anchor_crossings(mesh: &TriMesh, curve: &SurfaceCurve, anchors: &[Anchor]) -> Result<Vec<usize>, RelaxError> {
-    let points = curve.points(mesh);
-    let nearest = |p: DVec3| {
-        let distance = |i: &usize| points[*i].distance_squared(p);
-        (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
-    };
-    let crossing = |(anchor, a): (usize, &Anchor)| match *a {
-        Anchor::Crossing(i) if i < points.len() => Ok(i),
-        Anchor::Crossing(_) => Err(RelaxError::UnknownAnchor { anchor }),
-        Anchor::Point(p) => Ok(nearest(p.position(mesh))),
-    };
-    anchors.iter().enumerate().map(crossing).collect()
 }
 
 /// The vertices that crossings push against, and the side they are on, the hardest pushed first.

@@ -7,7 +7,7 @@ use super::session::WeaveError;
 use crate::elastica::{ElasticaGraph, FoundLoop};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
-use crate::surface::{Anchor, RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
+use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
 
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +57,7 @@ pub(super) fn polished(
     at: SurfacePoint,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
-    let options = RelaxOptions { anchors: vec![Anchor::Point(at)], ..Default::default() };
+    let options = RelaxOptions { through: vec![at], ..Default::default() };
     let proposal = Proposal::found(found);
     match relax(graph.mesh(), &found.curve, &options, progress) {
         Ok(relaxed) => Ok(proposal.relaxed(relaxed)),

@@ -22,6 +22,11 @@ const HOPELESS: f64 = 2.0;
 const SAME_TRIAL: f64 = 1e-2;
 /// Gain, as a fraction of the cost around, that makes a trial worth keeping; far above rounding.
 const MIN_TRIAL_GAIN: f64 = 1e-5;
+/// Weight of the squared distance from a point that the curve is to pass, relative to that of bending. A curve that
+/// is displaced at one point gives way over a length `λ` of some half a diagonal and resists as `192 / λ³`, which is
+/// some thousand; this is far more, so the point is passed nearly. It is far less than what a kink at a single edge
+/// costs.
+const PULL: f64 = 2e4;
 /// How far along the original curve, in segments, the nearest one is looked for around the one known.
 const WINDOW: usize = 8;
 
@@ -43,6 +48,8 @@ impl Default for Best {
 pub(super) struct Original {
     points: Vec<DVec3>,
     closed: bool,
+    /// Points to pass, each with the crossing nearest to it.
+    through: Vec<(DVec3, usize)>,
     /// Radius of the tube.
     radius: f64,
 }
@@ -51,11 +58,13 @@ impl Original {
     /// Remembers a strip.
     pub fn new(mesh: &TriMesh, strip: &Strip, options: &RelaxOptions<'_>) -> Self {
         let edges: f64 = strip.nodes.iter().map(|n| mesh.vector(n.halfedge).length()).sum();
-        Self {
-            points: (0..strip.len()).map(|i| strip.point(mesh, i)).collect(),
-            closed: strip.closed,
-            radius: options.tube * edges / strip.len() as f64,
-        }
+        let points: Vec<DVec3> = (0..strip.len()).map(|i| strip.point(mesh, i)).collect();
+        let nearest = |p: DVec3| {
+            let distance = |i: &usize| points[*i].distance_squared(p);
+            (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+        };
+        let through = options.through.iter().map(|at| at.position(mesh)).map(|p| (p, nearest(p))).collect();
+        Self { points, closed: strip.closed, through, radius: options.tube * edges / strip.len() as f64 }
     }
 
     /// Slides the crossings of a strip; remembers it if it is the best. Gives how hard they push in the end.
@@ -181,16 +190,43 @@ impl Original {
             let [right, left] = [Side::Right, Side::Left].map(|s| mesh.position(strip.end(mesh, i, s)));
             // Squared distances are polynomials of the parameter. Only what is across the original is pulled back.
             let tangent = along.normalize_or_zero();
-            let across = |v: DVec3| v - tangent * v.dot(tangent);
-            let square = |c: DVec3, d: DVec3| [c.length_squared(), 2.0 * c.dot(d), d.length_squared()];
             let away = square(right - foot, left - right);
             let node = &mut strip.nodes[i];
             node.reference = reference;
             let weight = options.fidelity * 0.5 * (here + back) / (self.radius * self.radius);
-            fidelity.push(square(across(right - foot), across(left - right)).map(|x| weight * x));
-            bounds.push(if node.held.is_some() { (node.t, node.t) } else { self.bounds(away, node.t, options.t_min) });
+            fidelity.push(square(across(right - foot, tangent), across(left - right, tangent)).map(|x| weight * x));
+            bounds.push(if node.held { (node.t, node.t) } else { self.bounds(away, node.t, options.t_min) });
+        }
+        for &(p, reference) in &self.through {
+            self.pull(mesh, options, strip, (p, reference), &mut fidelity);
         }
         Energy::new(mesh, options, strip, fidelity, bounds)
+    }
+
+    /// Adds to the fidelity of the crossing nearest to a point that the curve is to pass, if it is in the strip, its
+    /// squared distance from there across the curve.
+    fn pull(
+        &self,
+        mesh: &TriMesh,
+        options: &RelaxOptions<'_>,
+        strip: &Strip,
+        (p, reference): (DVec3, usize),
+        fidelity: &mut [[f64; 3]],
+    ) {
+        let around = |i: &usize| {
+            let apart = strip.nodes[*i].reference.abs_diff(reference);
+            apart.min(self.points.len() - apart) <= WINDOW
+        };
+        let distance = |i: &usize| strip.point(mesh, *i).distance_squared(p);
+        let Some(i) = (0..strip.len()).filter(around).min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
+            return;
+        };
+        let j = strip.nodes[i].reference;
+        let tangent = (self.points[(j + 1) % self.points.len()] - self.points[j]).normalize_or_zero();
+        let [right, left] = [Side::Right, Side::Left].map(|s| mesh.position(strip.end(mesh, i, s)));
+        let square = square(across(right - p, tangent), across(left - right, tangent));
+        let weight = PULL * options.beta;
+        fidelity[i].iter_mut().zip(square).for_each(|(f, s)| *f += weight * s);
     }
 
     /// The parameters inside the tube, of those allowed anyway; `t` itself is always among them.
@@ -204,12 +240,11 @@ impl Original {
         (low.min(t), high.max(t))
     }
 
-    /// The strip as a result; `held` are the crossings of the original that are held.
+    /// The strip as a result.
     pub fn finish(
         &self,
         mesh: &TriMesh,
         mut strip: Strip,
-        held: &[usize],
         before: CurveCost,
         after: CurveCost,
         passed: usize,
@@ -224,7 +259,6 @@ impl Original {
         };
         Relaxed {
             max_displacement: (0..strip.len()).map(distance).fold(0.0, f64::max),
-            anchors: held.iter().filter_map(|&a| strip.nodes.iter().position(|n| n.held == Some(a))).collect(),
             curve: strip.curve(),
             before,
             after,
@@ -232,4 +266,14 @@ impl Original {
             improved: true,
         }
     }
+}
+
+/// The part of `v` across a unit vector.
+fn across(v: DVec3, tangent: DVec3) -> DVec3 {
+    v - tangent * v.dot(tangent)
+}
+
+/// The coefficients of `|c + t d|²`.
+fn square(c: DVec3, d: DVec3) -> [f64; 3] {
+    [c.length_squared(), 2.0 * c.dot(d), d.length_squared()]
 }

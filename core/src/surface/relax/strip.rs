@@ -26,8 +26,8 @@ pub(super) struct Node {
     pub halfedge: HalfedgeId,
     /// From the right end of the edge to the left one.
     pub t: f64,
-    /// The crossing of the original curve that is held here, if any.
-    pub held: Option<usize>,
+    /// Whether it stays where it is.
+    pub held: bool,
     /// The segment of the original curve that was nearest last.
     pub reference: usize,
 }
@@ -46,7 +46,7 @@ impl Strip {
     pub fn new(curve: &SurfaceCurve) -> Self {
         let node = |(i, c): (usize, &Crossing)| {
             let t = if !curve.closed && i == 0 { 1.0 - c.t } else { c.t };
-            Node { halfedge: c.halfedge, t, held: None, reference: i }
+            Node { halfedge: c.halfedge, t, held: false, reference: i }
         };
         Self { nodes: curve.crossings.iter().enumerate().map(node).collect(), closed: curve.closed }
     }
@@ -145,11 +145,11 @@ impl Strip {
         let mut nodes: Vec<Node> = (first..end).map(|k| self.nodes[k % n]).collect();
         let m = nodes.len();
         if self.closed || first > 0 {
-            nodes[..2].iter_mut().for_each(|node| node.held = Some(usize::MAX));
+            nodes[..2].iter_mut().for_each(|node| node.held = true);
             nodes[0].halfedge = mesh.twin(nodes[0].halfedge)?;
         }
         if self.closed || end < n {
-            nodes[m - 2..].iter_mut().for_each(|node| node.held = Some(usize::MAX));
+            nodes[m - 2..].iter_mut().for_each(|node| node.held = true);
         }
         Some((Self { nodes, closed: false }, first % n))
     }
@@ -158,9 +158,9 @@ impl Strip {
     pub fn put_back(&mut self, window: Self, first: usize, count: usize) {
         let (n, m) = (self.len(), window.len());
         let mut nodes = window.nodes;
-        // What is held is as it was, but for what the window changed to hold it.
+        // What the window holds is as it was.
         for (k, old) in [(0, first), (1, first + 1), (m - 2, first + count - 2), (m - 1, first + count - 1)] {
-            if nodes[k].held == Some(usize::MAX) {
+            if nodes[k].held {
                 nodes[k] = self.nodes[old % n];
             }
         }
@@ -227,13 +227,13 @@ impl Strip {
         }
         let n = self.len();
         if n - count + fresh.len() < if self.closed { 3 } else { 2 }
-            || (0..count).any(|k| self.nodes[(first + k) % n].held.is_some())
+            || (0..count).any(|k| self.nodes[(first + k) % n].held)
         {
             return false;
         }
         let reference = self.nodes[run.0].reference;
         let t = if side == Side::Left { t_min } else { 1.0 - t_min };
-        let fresh = fresh.into_iter().map(|halfedge| Node { halfedge, t, held: None, reference });
+        let fresh = fresh.into_iter().map(|halfedge| Node { halfedge, t, held: false, reference });
         if self.closed {
             self.nodes = (count..n).map(|k| self.nodes[(first + k) % n]).chain(fresh).collect();
         } else {
@@ -350,9 +350,9 @@ mod tests {
         let run = strip.run(&mesh, i, Side::Right).unwrap();
         assert!(!strip.pass(&mesh, run, Side::Right, 0.03));
         let run = strip.run(&mesh, i, Side::Left).unwrap();
-        strip.nodes[i].held = Some(i);
+        strip.nodes[i].held = true;
         assert!(!strip.pass(&mesh, run, Side::Left, 0.03));
-        strip.nodes[i].held = None;
+        strip.nodes[i].held = false;
         assert!(strip.pass(&mesh, run, Side::Left, 0.03));
     }
 
@@ -364,7 +364,7 @@ mod tests {
             for i in 0..strip.len() {
                 let run = strip.run(&mesh, i, Side::Left).unwrap();
                 let (window, first) = strip.window(&mesh, run, 6).unwrap();
-                assert!(window.nodes.iter().filter(|n| n.held.is_some()).count() >= 2);
+                assert!(window.nodes.iter().filter(|n| n.held).count() >= 2);
                 let mut whole = strip.clone();
                 let count = window.len();
                 whole.put_back(window, first, count);

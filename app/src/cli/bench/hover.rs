@@ -26,9 +26,11 @@ const BEST: &str = "the best loop, relaxed";
 const ALL: &str = "all proposals, relaxed";
 
 /// Elastic energy of the best loop as the search found it.
-pub(super) const ENERGY: &str = "length and bending of the best loop";
+const ENERGY: &str = "length and bending of the best loop";
 /// And of the curve that is proposed.
-pub(super) const RELAXED: &str = "the same, relaxed";
+const RELAXED: &str = "the same, relaxed";
+/// The second over the first.
+const RELAXED_SHARE: &str = "the same, relaxed / found";
 
 /// Points of one stroke of the pointer.
 const STROKE: usize = 25;
@@ -174,7 +176,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
         report.add_times(group, &format!("{name}: {ALL}"), &all);
     }
     let share = before.iter().zip(&after).map(|(before, after)| after / before).collect();
-    for (what, values) in [(ENERGY, before), (RELAXED, after), ("the same, relaxed / found", share)] {
+    for (what, values) in [(ENERGY, before), (RELAXED, after), (RELAXED_SHARE, share)] {
         report.add(group, what, Unit::Number, values);
     }
     Ok(())

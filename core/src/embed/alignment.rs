@@ -5,16 +5,12 @@
 //! whose isolines the field runs along it. A feature that the field crosses at a slant contradicts the layout: there it is
 //! left alone rather than torn.
 
-use std::f64::consts::FRAC_PI_2;
-
-use super::net::{Net, jump_across};
+use super::feature_lines::{self, Headed, heading_in};
+use super::net::Net;
 use super::straight::{Crossroads, corner};
 use crate::field::Metric;
-use crate::mesh::{EdgeId, HalfedgeId};
+use crate::mesh::HalfedgeId;
 use crate::param::Relation;
-
-/// Largest angle, in quarter turns, between a feature and the field along it: half of what would make it ambiguous.
-const SLANT: f64 = 0.25;
 
 /// What the layout demands to be isolines.
 pub(super) fn demanded(net: &Net, roads: &Crossroads) -> Vec<Relation> {
@@ -42,46 +38,35 @@ fn across(heading: i32) -> u8 {
     if heading % 2 == 0 { 1 } else { 0 }
 }
 
+/// Largest angle, in quarter turns, between an edge of a feature and the field along it where the field decides: half of
+/// what would make it ambiguous.
+pub(super) const SLANT: f64 = 0.25;
+/// As much as there is: the whole line decides.
+pub(super) const WHOLE: f64 = 4.0;
+
 /// The half-edges of features that can be isolines where the field has these angles, and of which coordinate; those first
-/// that the field follows best.
-pub(super) fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<(HalfedgeId, u8)> {
+/// that the field follows best. Left out are those that deviate by more than `slant` quarter turns from the field.
+pub(super) fn features(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool], slant: f64) -> Vec<(HalfedgeId, u8)> {
     let mesh = &net.mesh;
-    let mut found: Vec<Option<(i32, f64)>> = vec![None; mesh.n_edges()];
-    for e in mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e)) {
-        let h = mesh.halfedge(e);
-        let turns = (metric.direction(h) - angle[mesh.face(h).index()]) / FRAC_PI_2;
-        let off = (turns - turns.round()).abs();
-        if off < SLANT {
-            found[e.index()] = Some(((turns.round() as i32).rem_euclid(4), off));
-        }
+    let mut found: Vec<Option<Headed>> = vec![None; mesh.n_edges()];
+    for headed in feature_lines::headings(net, metric, angle, sharp).into_iter().filter(|h| h.off < slant) {
+        found[mesh.edge(headed.halfedge).index()] = Some(headed);
     }
     for f in mesh.faces() {
         // Two sides of a triangle on one isoline would flatten it: the one that fits less gives way.
         let sides = mesh.face_halfedges(f);
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let (a, b) = (mesh.edge(sides[i]), mesh.edge(sides[j]));
-            let axis = |k: usize| heading_in(net, sides[k], found[mesh.edge(sides[k]).index()]?.0).map(across);
-            if let (Some(p), Some(q)) = (axis(i), axis(j))
-                && p == q
+            let of = |k: usize| found[mesh.edge(sides[k]).index()];
+            let axis = |k: usize| of(k).map(|headed| across(heading_in(net, sides[k], &headed)));
+            if let (Some(a), Some(b)) = (of(i), of(j))
+                && axis(i) == axis(j)
             {
-                let off = |e: EdgeId| found[e.index()].map_or(0.0, |x| x.1);
-                let worse = if off(a) > off(b) { a } else { b };
-                found[worse.index()] = None;
+                let worse = if a.off > b.off { a } else { b };
+                found[mesh.edge(worse.halfedge).index()] = None;
             }
         }
     }
-    let mut list: Vec<(f64, HalfedgeId, i32)> =
-        mesh.edges().filter_map(|e| found[e.index()].map(|(k, off)| (off, mesh.halfedge(e), k))).collect();
-    list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    list.into_iter().map(|(_, h, k)| (h, across(k))).collect()
-}
-
-/// The heading along a side in its own triangle, from that of its edge's half-edge in that one's triangle.
-fn heading_in(net: &Net, side: HalfedgeId, heading: i32) -> Option<i32> {
-    let h = net.mesh.halfedge(net.mesh.edge(side));
-    if h == side {
-        return Some(heading);
-    }
-    // Only whether it is even matters here, and against the half-edge that is the same.
-    Some((heading - jump_across(&net.mesh, &net.jump, h)).rem_euclid(4))
+    let mut list: Vec<Headed> = found.into_iter().flatten().collect();
+    list.sort_by(|a, b| a.off.total_cmp(&b.off).then(a.halfedge.cmp(&b.halfedge)));
+    list.into_iter().map(|headed| (headed.halfedge, across(headed.heading))).collect()
 }

@@ -22,6 +22,23 @@ pub(super) fn step_to_crossing(
     map: &SeamlessMap,
     ends: &[(u32, bool)],
 ) -> Option<(HalfedgeId, DVec2)> {
+    let (corner, crossing) = crossing(net, roads, map, ends)?;
+    let off = crossing - at(map, corner);
+    let [u, v] = map.gradients(metric, net.mesh.face(corner));
+    let area = u.perp_dot(v);
+    // Where the map is folded or flat its gradients tell nothing.
+    (area > FLAT * 0.5 * (u.length_squared() + v.length_squared()))
+        .then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
+}
+
+/// The crossing of the isolines of a regular node, in the coordinates of the triangle of the half-edge returned, a corner
+/// at the node; `None` where the map does not tell.
+pub(super) fn crossing(
+    net: &Net,
+    roads: &Crossroads,
+    map: &SeamlessMap,
+    ends: &[(u32, bool)],
+) -> Option<(HalfedgeId, DVec2)> {
     let mesh = &net.mesh;
     let corner = roads.corner(net, *ends.first()?);
     // For each coordinate what a held node says, the one by the shortest chain, and the sum of what others say.
@@ -44,12 +61,7 @@ pub(super) fn step_to_crossing(
         }
     }
     let off = [0, 1].map(|axis| held[axis].map_or(others[axis].0 / others[axis].1, |m| m.1));
-    let off = DVec2::from_array(off);
-    let [u, v] = map.gradients(metric, mesh.face(corner));
-    let area = u.perp_dot(v);
-    // Where the map is folded or flat its gradients tell nothing.
-    (area > FLAT * 0.5 * (u.length_squared() + v.length_squared()))
-        .then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
+    Some((corner, at(map, corner) + DVec2::from_array(off)))
 }
 
 /// How much less area than a square of its size a map's image may have before it is too flat to follow.

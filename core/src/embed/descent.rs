@@ -4,7 +4,7 @@
 //! solves. What remains of the energy tells every node where to go. If the step made the energy less it stands, and
 //! another follows; if not, it is taken back and tried at half the length.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
 use super::job::{Job, Settings};
@@ -66,6 +66,8 @@ pub struct Optimizer<'a> {
     pub(super) features: Features,
     /// Edges of features that are only pulled even where others are held; empty: none.
     pub(super) loose: Vec<bool>,
+    /// How strongly features are pulled, as a multiple of what is usual.
+    pub(super) pull: f64,
     pub(super) state: State,
     /// Factor of the steps of every node.
     pub(super) pace: Vec<f64>,
@@ -141,6 +143,7 @@ impl<'a> Optimizer<'a> {
             settings,
             features,
             loose: &[],
+            pull: 1.0,
         };
         let state = match solver.solve(net, metric, None, aim, progress)? {
             Ok(state) => state,
@@ -164,6 +167,7 @@ impl<'a> Optimizer<'a> {
             shape,
             features,
             loose: Vec::new(),
+            pull: 1.0,
             state,
             pace: vec![1.0; layout.nodes.len()],
             heading: vec![DVec3::ZERO; layout.nodes.len()],
@@ -209,6 +213,15 @@ impl<'a> Optimizer<'a> {
     /// Begins anew where it once was, with all nodes held on their isolines.
     pub(super) fn begin_held(&mut self, state: State) {
         self.roads.hold_all();
+        if self.shape.is_some() {
+            self.release_features();
+        }
+        for (hold, node) in self.ground.hold.iter_mut().zip(&state.net.nodes) {
+            // Nodes that have since been brought onto features are where they were.
+            if *hold == Hold::Curve && !self.ground.on_curve[node.vertex.index()] {
+                *hold = Hold::Free;
+            }
+        }
         self.state = state;
         self.restart();
     }
@@ -321,15 +334,38 @@ impl<'a> Optimizer<'a> {
 
     /// As [`Self::solve`], [`Folded`] where no map without folds was found.
     pub(super) fn attempt(&mut self, net: Net, progress: &Progress) -> Result<Result<State, Folded>, EmbeddingError> {
-        let metric = Metric::new(&net.mesh);
         let State { metric: before, field, solution, .. } = &self.state;
-        let uv = &solution.map.uv;
-        let (list, turned) = match self.shape {
-            Some(_) => (gradients(before, &field.angle, uv), self.turned(&net)),
-            None => (Vec::new(), Vec::new()),
+        let (uv, list, turned) = match self.shape {
+            Some(_) => {
+                let uv = &solution.map.uv;
+                (uv.clone(), gradients(before, &field.angle, uv), self.turned(&net))
+            }
+            None => Default::default(),
         };
-        let start = Start::Moved { uv, gradients: &list, turned: &turned };
+        let start = Start::Moved { uv: &uv, gradients: &list, turned: &turned };
         let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: NEWTON_STEPS });
+        self.solve_for(net, aim, progress)
+    }
+
+    /// As [`Self::attempt`], with the map without folds nearest to one of these coordinates, which is left as it is.
+    pub(super) fn attempt_at(
+        &mut self,
+        net: Net,
+        uv: &[[DVec2; 3]],
+        progress: &Progress,
+    ) -> Result<Result<State, Folded>, EmbeddingError> {
+        let start = Start::Map(uv);
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: 0 });
+        self.solve_for(net, aim, progress)
+    }
+
+    fn solve_for(
+        &mut self,
+        net: Net,
+        aim: Aim<'_>,
+        progress: &Progress,
+    ) -> Result<Result<State, Folded>, EmbeddingError> {
+        let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
@@ -341,6 +377,7 @@ impl<'a> Optimizer<'a> {
             settings: self.settings,
             features: self.features,
             loose: &self.loose,
+            pull: self.pull,
         };
         let next = solver.solve(net, metric, Some(&self.state.field.angle), aim, progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);

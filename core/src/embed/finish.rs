@@ -2,10 +2,9 @@
 
 use super::EmbeddingError;
 use super::descent::{HOPELESS, Optimizer};
-use super::solver::{Features, Folded};
 use super::state::State;
 use crate::field::GuidedSystem;
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::TriMesh;
 use crate::param::{Effort, Fold};
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
@@ -17,8 +16,6 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
-/// How often features are let go where the map would fold, each time a ring of triangles farther around.
-const LOOSENINGS: usize = 6;
 /// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
 const SETTLING: usize = 3;
 /// By what share the energy changes when they have come there.
@@ -32,6 +29,9 @@ impl Optimizer<'_> {
     ///
     /// See [`EmbeddingError`].
     pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
+        if self.shape.is_some() {
+            self.hold_features(progress)?;
+        }
         for _ in 0..SETTLING {
             let before = self.state.solution.energy;
             let (Some(state), _) = self.as_far_as_possible(Self::settled, progress)? else { break };
@@ -43,9 +43,12 @@ impl Optimizer<'_> {
         if self.shape.is_none() {
             self.refine(progress)?;
         }
+        if self.shape.is_some() {
+            self.settle_exactly(progress)?;
+        }
         self.roads.hold_all();
         loop {
-            self.state = self.solve(self.state.net.clone(), progress)?;
+            self.solve_loosening(progress)?;
             let State { net, solution, .. } = &self.state;
             if self.shape.is_some()
                 || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0
@@ -57,7 +60,6 @@ impl Optimizer<'_> {
             self.round(edge, progress)?;
         }
         if self.shape.is_some() {
-            self.hold_features(progress)?;
             return Ok(Vec::new());
         }
         self.stiffen(progress)?;
@@ -76,43 +78,6 @@ impl Optimizer<'_> {
         solution.energy = unfolded.energy;
         solution.free = unfolded.y;
         Ok(unfolded.folds)
-    }
-
-    /// Makes features isolines that were pulled towards them, where a map without folds allows it.
-    fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        if !self.settings.exact_features || self.features == Features::Held || !self.sharp.contains(&true) {
-            return Ok(());
-        }
-        self.features = Features::Held;
-        for round in 1..=LOOSENINGS {
-            match self.attempt(self.state.net.clone(), progress)? {
-                Ok(state) => {
-                    self.state = state;
-                    return Ok(());
-                }
-                Err(Folded(list)) => self.loosen(&list, round),
-            }
-        }
-        self.features = Features::Pulled;
-        self.loose.clear();
-        tracing::debug!("features are not isolines exactly");
-        Ok(())
-    }
-
-    /// Lets the features around triangles that fold, so many rings far, be pulled only.
-    fn loosen(&mut self, folded: &[FaceId], rings: usize) {
-        let mesh = &self.state.net.mesh;
-        let mut near = vec![false; mesh.n_vertices()];
-        let mut faces: Vec<FaceId> = folded.to_vec();
-        for _ in 0..rings {
-            faces.iter().flat_map(|&f| mesh.face_vertices(f)).for_each(|v| near[v.index()] = true);
-            faces = mesh.faces().filter(|&f| mesh.face_vertices(f).iter().any(|v| near[v.index()])).collect();
-        }
-        self.loose.resize(mesh.n_edges(), false);
-        for e in mesh.edges().filter(|e| self.sharp[e.index()]) {
-            self.loose[e.index()] |= mesh.edge_vertices(e).iter().any(|v| near[v.index()]);
-        }
-        tracing::debug!(loose = self.loose.iter().filter(|&&l| l).count(), "features let go where the map would fold");
     }
 
     /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.

@@ -7,6 +7,7 @@
 //! The room knows layouts and drawings, not how they came about.
 
 mod alignment;
+mod attach;
 mod bending;
 mod coarse;
 mod collapse;
@@ -14,6 +15,8 @@ mod course;
 mod cross;
 mod descent;
 mod emerge;
+mod feature_lines;
+mod features;
 mod finish;
 mod gradient;
 mod guides;
@@ -30,6 +33,7 @@ mod patches;
 mod refine;
 mod relocate;
 mod rose;
+mod settle;
 mod setup;
 mod shift;
 mod shorter;

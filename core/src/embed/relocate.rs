@@ -9,6 +9,7 @@ use std::collections::{HashMap, VecDeque};
 use glam::{DVec2, DVec3};
 
 use super::net::Net;
+use super::settle::Crossing;
 use crate::field::Metric;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::{SurfaceIndex, straightest};
@@ -92,20 +93,55 @@ impl Ground<'_> {
         corners.retain(|&v| v == from || !(taken.contains(&v) || self.on_curve[v.index()] || beside(v)));
         corners.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
         for to in corners {
-            let Some(path) = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v)) else { continue };
-            let old = net.mesh.position(from);
-            let before = self.at_rest(&net.mesh, from, to);
-            net.mesh.set_position(from, self.home[from.index()]);
-            net.mesh.set_position(to, place);
-            if sound(&net.mesh, &before) {
-                for h in path {
-                    net.move_along(node, h);
-                }
+            let path = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v));
+            if path.is_some_and(|path| self.bring(net, node, (&path, to), place)) {
                 return true;
             }
-            net.mesh.set_position(to, self.home[to.index()]);
-            net.mesh.set_position(from, old);
         }
+        false
+    }
+
+    /// The net with a node put at a crossing by one of the corners of its triangle, those first that have to move least; on
+    /// a feature by an end of that edge.
+    pub(super) fn put_at<'n>(
+        &'n self,
+        net: &'n Net,
+        node: usize,
+        at: &'n Crossing,
+        sharp: impl Fn(HalfedgeId) -> bool,
+    ) -> impl Iterator<Item = Net> + 'n {
+        let from = net.nodes[node].vertex;
+        let sides = net.mesh.face_halfedges(at.face);
+        let place = self.index.nearest(at.place).position(self.surface);
+        let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
+        let on = (0..3).find(|&k| at.weights[(k + 2) % 3] == 0.0 && sharp(sides[k])).map(|k| sides[k]);
+        let allowed = |v: VertexId| match on {
+            Some(h) => (v == net.mesh.origin(h) || v == net.mesh.target(h)) && self.along(&net.mesh, v).len() == 2,
+            None => !self.on_curve[v.index()],
+        };
+        let mut list = net.mesh.face_vertices(at.face).to_vec();
+        list.retain(|v| allowed(*v) && !taken.contains(v));
+        list.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
+        list.into_iter().filter_map(move |to| {
+            let path = edge_path(&net.mesh, &at.strip, from, to, |v| taken.contains(&v))?;
+            let mut moved = net.clone();
+            self.bring(&mut moved, node, (&path, to), place).then_some(moved)
+        })
+    }
+
+    /// Brings a node along edges to a vertex that is put at `place`; nothing changes if triangles would suffer.
+    fn bring(&self, net: &mut Net, node: usize, (path, to): (&[HalfedgeId], VertexId), place: DVec3) -> bool {
+        let from = net.nodes[node].vertex;
+        let old = net.mesh.position(from);
+        let before = self.at_rest(&net.mesh, from, to);
+        net.mesh.set_position(from, self.home[from.index()]);
+        net.mesh.set_position(to, place);
+        if sound(&net.mesh, &before) {
+            path.iter().for_each(|&h| net.move_along(node, h));
+            return true;
+        }
+        net.mesh.set_position(to, self.home[to.index()]);
+        net.mesh.set_position(from, old);
         false
     }
 
@@ -207,7 +243,7 @@ fn strip(mesh: &TriMesh, first: FaceId, crossed: &[HalfedgeId]) -> Vec<FaceId> {
 }
 
 /// A path of half-edges within a strip of triangles that avoids vertices that are `taken` and the boundary.
-fn edge_path(
+pub(super) fn edge_path(
     mesh: &TriMesh,
     strip: &[FaceId],
     from: VertexId,

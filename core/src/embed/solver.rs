@@ -103,6 +103,8 @@ pub(super) struct Solver<'s> {
     pub features: Features,
     /// Edges of features that are only pulled even so; empty: none.
     pub loose: &'s [bool],
+    /// How strongly features are pulled, as a multiple of what is usual.
+    pub pull: f64,
 }
 
 impl Solver<'_> {
@@ -121,10 +123,15 @@ impl Solver<'_> {
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
-        let features = alignment::features(&net, &metric, &field.angle, self.sharp);
+        // A map of least squares is torn by what contradicts it; one without folds shows what can be followed.
+        let whole = matches!(aim, Aim::Injective { .. });
+        let slant = if whole { alignment::WHOLE } else { alignment::SLANT };
+        let features = alignment::features(&net, &metric, &field.angle, self.sharp, slant);
         let is_loose = |h: HalfedgeId| self.loose.get(mesh.edge(h).index()).copied().unwrap_or(false);
         let only_pulled = |f: &(HalfedgeId, u8)| self.features == Features::Pulled || is_loose(f.0);
         let (pulled, features): (Vec<_>, Vec<_>) = features.into_iter().partition(only_pulled);
+        let strength = |h: HalfedgeId| if is_loose(h) { 1.0 } else { self.pull };
+        let pulled: Vec<_> = pulled.into_iter().map(|(h, axis)| (h, axis, strength(h))).collect();
         let (sizing, sizes) = (self.settings.sizing, self.sizes.take());
         let (lengths, built) = rayon::join(
             || if sizing { lengths((mesh, &metric), &angle, &net.jump, sizes) } else { Ok((Vec::new(), sizes)) },
@@ -243,7 +250,7 @@ struct Setting<'s> {
     field: &'s CrossField,
     objective: &'s Objective,
     firmness: &'s [f64],
-    pulled: &'s [(HalfedgeId, u8)],
+    pulled: &'s [(HalfedgeId, u8, f64)],
 }
 
 impl Setting<'_> {

@@ -34,6 +34,15 @@ pub(super) struct Derivatives {
     pub hessian: [f64; 21],
 }
 
+/// A side of a triangle that is pulled towards an isoline: its two corners, the coordinate, how strongly, and by how much
+/// that differs from the first to the second.
+struct Pull {
+    ends: [usize; 2],
+    axis: usize,
+    strength: f64,
+    off: f64,
+}
+
 /// The energy of maps on one mesh along one field.
 #[derive(Debug, Clone)]
 pub struct InjectiveEnergy<'a> {
@@ -42,8 +51,9 @@ pub struct InjectiveEnergy<'a> {
     objective: &'a Objective,
     shape: Shape,
     firmness: &'a [f64],
-    /// For each side of each triangle the coordinate that it is pulled towards an isoline of; empty: none.
-    pulled: Vec<[Option<u8>; 3]>,
+    /// For each side of each triangle the coordinate that it is pulled towards an isoline of, and how strongly; empty:
+    /// none.
+    pulled: Vec<[Option<(u8, f64)>; 3]>,
 }
 
 impl<'a> InjectiveEnergy<'a> {
@@ -58,23 +68,25 @@ impl<'a> InjectiveEnergy<'a> {
         Self { metric, angle, objective, shape, firmness, pulled: Vec::new() }
     }
 
-    /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v).
-    pub fn pulling(mut self, list: &[(HalfedgeId, u8)]) -> Self {
+    /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v), each so many times as strongly
+    /// as usual.
+    pub fn pulling(mut self, list: &[(HalfedgeId, u8, f64)]) -> Self {
         if !list.is_empty() {
             self.pulled = vec![[None; 3]; self.angle.len()];
         }
-        for &(h, axis) in list {
-            self.pulled[h.index() / 3][h.index() % 3] = Some(axis);
+        for &(h, axis, strength) in list {
+            self.pulled[h.index() / 3][h.index() % 3] = Some((axis, strength * PULL));
         }
         self
     }
 
-    /// The sides of a triangle that are pulled: their corners, the coordinate, and how much it differs between them.
-    fn pulls(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = (usize, usize, usize, f64)> {
+    /// The sides of a triangle that are pulled.
+    fn pulls(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = Pull> {
         let sides = self.pulled.get(f).copied().unwrap_or_default();
-        sides.into_iter().enumerate().filter_map(move |(i, axis)| {
-            let (k, j) = (usize::from(axis?), (i + 1) % 3);
-            Some((i, j, k, w[j][k] - w[i][k]))
+        sides.into_iter().enumerate().filter_map(move |(i, pulled)| {
+            let ((axis, strength), j) = (pulled?, (i + 1) % 3);
+            let axis = usize::from(axis);
+            Some(Pull { ends: [i, j], axis, strength, off: w[j][axis] - w[i][axis] })
         })
     }
 
@@ -91,7 +103,7 @@ impl<'a> InjectiveEnergy<'a> {
     pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
         let each = |(f, w): (usize, &[DVec2; 3])| {
             let area = self.metric.area(FaceId::new(f));
-            let pull: f64 = self.pulls(f, w).map(|(.., d)| PULL * d * d).sum();
+            let pull: f64 = self.pulls(f, w).map(|p| p.strength * p.off * p.off).sum();
             Some(area * self.density(f).value(&matrix(&self.hats(f), w))? + pull)
         };
         // Added up in order: the sum must not depend on threads.
@@ -115,12 +127,12 @@ impl<'a> InjectiveEnergy<'a> {
                 entry += 1;
             }
         }
-        for (i, j, k, d) in self.pulls(f, w) {
-            let (p, q) = (3 * k + i, 3 * k + j);
-            gradient[p] -= 2.0 * PULL * d;
-            gradient[q] += 2.0 * PULL * d;
+        for Pull { ends, axis, strength, off } in self.pulls(f, w) {
+            let [p, q] = ends.map(|i| 3 * axis + i);
+            gradient[p] -= 2.0 * strength * off;
+            gradient[q] += 2.0 * strength * off;
             for (r, c, sign) in [(p, p, 1.0), (q, q, 1.0), (p.max(q), p.min(q), -1.0)] {
-                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * PULL;
+                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * strength;
             }
         }
         Derivatives { gradient, hessian }

@@ -1,0 +1,161 @@
+//! Features onto isolines, exactly.
+//!
+//! Made relations at once, features fold the map; pulled, they come near. So they are pulled harder and harder, each time
+//! from the map before, which is without folds and stays so. Where something cannot follow, it shows: what lies between a
+//! node and the feature that it belongs to is squeezed, and the node is brought there ([`super::attach`]); an edge that
+//! keeps slanting contradicts the layout and is let go. What is left is on isolines but for rounding, and to make it
+//! relations moves nothing.
+
+use super::EmbeddingError;
+use super::alignment::{self, WHOLE};
+use super::descent::Optimizer;
+use super::solver::{Features, Folded};
+use super::state::State;
+use crate::mesh::{FaceId, HalfedgeId};
+use crate::param::{InjectiveEnergy, NewtonSystem, Solution};
+use crate::progress::Progress;
+
+/// How hard features are pulled, in multiples of what is usual, until nodes that belong to them show.
+const GENTLY: [f64; 3] = [10.0, 100.0, 1e3];
+/// How often nodes are looked for and the features pulled anew.
+const ROUNDS: usize = 3;
+/// How hard they are pulled then, and which slope against its isoline an edge may still have each time: the more it is
+/// pulled the less is left of one that can follow.
+const HARD: [(f64, f64); 3] = [(1e3, 0.2), (1e4, 0.1), (1e6, 0.02)];
+/// Steps of Newton's method each time.
+const STEPS: usize = 15;
+/// How often features are let go where the map would fold even so, each time a ring of triangles farther around.
+const LOOSENINGS: usize = 6;
+
+impl Optimizer<'_> {
+    /// Makes features isolines that were pulled towards them, where the layout allows it.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        if !self.settings.exact_features || self.features == Features::Held || !self.sharp.contains(&true) {
+            return Ok(());
+        }
+        self.synchronise(progress)?;
+        let mut newton = self.newton()?;
+        for _ in 0..ROUNDS {
+            for pull in GENTLY {
+                self.pull_harder(pull, newton.as_ref(), progress)?;
+            }
+            self.pull = GENTLY[0];
+            let count = self.attach(progress)?;
+            if count == 0 {
+                break;
+            }
+            newton = self.newton()?;
+        }
+        for (pull, slope) in HARD {
+            self.pull_harder(pull, newton.as_ref(), progress)?;
+            self.let_go(slope);
+        }
+        self.features = Features::Held;
+        self.solve_loosening(progress)
+    }
+
+    /// Solves for field and map where the nodes are; where features fold the map these are let go.
+    ///
+    /// # Errors
+    ///
+    /// [`EmbeddingError::Folded`] if the map folds even with features only pulled; the state is then as before.
+    pub(super) fn solve_loosening(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        for round in 1..=LOOSENINGS {
+            match self.attempt(self.state.net.clone(), progress)? {
+                Ok(state) => {
+                    self.state = state;
+                    return Ok(());
+                }
+                Err(Folded(list)) if self.features == Features::Held && self.shape.is_some() => {
+                    self.loosen(&list, round);
+                }
+                Err(_) => return Err(EmbeddingError::Folded),
+            }
+        }
+        tracing::debug!("features are not isolines exactly");
+        self.release_features();
+        self.state = self.solve(self.state.net.clone(), progress)?;
+        Ok(())
+    }
+
+    /// Lets features be pulled only, as usual.
+    pub(super) fn release_features(&mut self) {
+        self.features = Features::Pulled;
+        self.pull = 1.0;
+        self.loose.clear();
+    }
+
+    /// Brings the system of the map in line with the state: attempts that failed leave that of another net.
+    pub(super) fn synchronise(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        self.state = self.solve(self.state.net.clone(), progress)?;
+        Ok(())
+    }
+
+    fn newton(&mut self) -> Result<Option<NewtonSystem>, EmbeddingError> {
+        Ok(self.seamless.as_mut().map(|system| system.newton()).transpose()?)
+    }
+
+    /// Pulls features so many times as hard as usual, in the field at hand.
+    fn pull_harder(
+        &mut self,
+        pull: f64,
+        newton: Option<&NewtonSystem>,
+        progress: &Progress,
+    ) -> Result<(), EmbeddingError> {
+        let (Some(system), Some(newton), Some(shape)) = (&self.seamless, newton, self.shape) else { return Ok(()) };
+        self.pull = pull;
+        let State { net, metric, field, objective, firmness, solution } = &self.state;
+        let pulled: Vec<_> = self.followed().into_iter().map(|(h, axis)| (h, axis, pull)).collect();
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(&pulled);
+        let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
+        system.descend(newton, &energy, &mut at, STEPS, progress)?;
+        tracing::debug!(pull, edges = pulled.len(), faces = net.mesh.n_faces(), "features pulled");
+        self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };
+        Ok(())
+    }
+
+    /// The edges of features that follow isolines, and of which coordinate; those let go are left out.
+    fn followed(&self) -> Vec<(HalfedgeId, u8)> {
+        let State { net, metric, field, .. } = &self.state;
+        let mut list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE);
+        list.retain(|&(h, _)| !self.loose.get(net.mesh.edge(h).index()).copied().unwrap_or(false));
+        list
+    }
+
+    /// Lets edges go that slope more than so much against their isolines.
+    fn let_go(&mut self, slope: f64) {
+        let list = self.followed();
+        let State { net, solution, .. } = &self.state;
+        self.loose.resize(net.mesh.n_edges(), false);
+        let mut count = 0;
+        for (h, axis) in list {
+            let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| solution.map.uv[h.index() / 3][k]);
+            let d = q - p;
+            if d[usize::from(axis)].abs() > slope * d.length() {
+                self.loose[net.mesh.edge(h).index()] = true;
+                count += 1;
+            }
+        }
+        tracing::debug!(count, "edges of features let go that keep slanting");
+    }
+
+    /// Lets the features around triangles that fold, so many rings far, be pulled only.
+    fn loosen(&mut self, folded: &[FaceId], rings: usize) {
+        let mesh = &self.state.net.mesh;
+        let mut near = vec![false; mesh.n_vertices()];
+        let mut faces: Vec<FaceId> = folded.to_vec();
+        for _ in 0..rings {
+            faces.iter().flat_map(|&f| mesh.face_vertices(f)).for_each(|v| near[v.index()] = true);
+            faces = mesh.faces().filter(|&f| mesh.face_vertices(f).iter().any(|v| near[v.index()])).collect();
+        }
+        self.loose.resize(mesh.n_edges(), false);
+        for e in mesh.edges().filter(|e| self.sharp[e.index()]) {
+            self.loose[e.index()] |= mesh.edge_vertices(e).iter().any(|v| near[v.index()]);
+        }
+        tracing::debug!(loose = self.loose.iter().filter(|&&l| l).count(), "features let go where the map would fold");
+    }
+}

@@ -9,6 +9,7 @@ mod embedding;
 mod export;
 mod ground;
 mod layout;
+mod met;
 mod model;
 mod proposal;
 mod quads;

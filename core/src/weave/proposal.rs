@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::met::Company;
 use super::session::WeaveError;
 use crate::elastica::{ElasticaGraph, FoundLoop};
 use crate::mesh::TriMesh;
@@ -50,21 +51,32 @@ impl Proposal {
     }
 }
 
-/// A found loop, relaxed to a smooth curve that still passes `at`.
+/// Radii of the tubes in which loops are relaxed, in mean edges: the next one where the loop would meet more than it did.
+const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
+
+/// A found loop, relaxed to a smooth curve that still passes `at` and crosses neither features nor placed strips more
+/// often than it did.
 pub(super) fn polished(
     graph: &ElasticaGraph,
+    company: &Company<'_>,
     found: &FoundLoop,
     at: SurfacePoint,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
-    let options = RelaxOptions { through: vec![at], ..Default::default() };
-    let proposal = Proposal::found(found);
-    match relax(graph.mesh(), &found.curve, &options, progress) {
-        Ok(relaxed) => Ok(proposal.relaxed(relaxed)),
-        Err(error) => {
-            progress.check()?;
-            tracing::debug!(%error, "a loop is shown as found");
-            Ok(proposal)
+    let before = company.met(&found.curve);
+    for tube in TUBES {
+        let options = RelaxOptions { through: vec![at], tube, ..Default::default() };
+        match relax(graph.mesh(), &found.curve, &options, progress) {
+            Ok(relaxed) if company.met(&relaxed.curve).no_more_than(&before) => {
+                return Ok(Proposal::found(found).relaxed(relaxed));
+            }
+            Ok(_) => tracing::debug!(tube, "a loop relaxed would cross more than it did"),
+            Err(error) => {
+                progress.check()?;
+                tracing::debug!(%error, "a loop cannot be relaxed");
+                break;
+            }
         }
     }
+    Ok(Proposal::found(found))
 }

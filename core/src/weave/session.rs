@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::design::{Design, DesignError, Pin, Strip, StripId};
 use super::ground::alike;
+use super::met::Company;
 use super::model::{Model, Options};
 use super::proposal::{Proposal, polished};
 use super::recent::RecentSearches;
@@ -219,7 +220,9 @@ impl Session {
         let at = self.model.to_woven(at);
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
-        let polished = |l: &FoundLoop| polished(graph, l, at, progress);
+        let placed = self.design.strips.iter().map(Strip::woven);
+        let company = Company::new(&self.model.mesh, &self.model.sharp, placed);
+        let polished = |l: &FoundLoop| polished(graph, &company, l, at, progress);
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
             Certainty::Found => first(Proposal::found(l)),

@@ -13,6 +13,7 @@ mod graph;
 mod mask;
 mod proposals;
 mod search;
+mod seed;
 mod stars;
 #[cfg(test)]
 mod tests;

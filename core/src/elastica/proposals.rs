@@ -46,6 +46,8 @@ pub struct ProposalQuery<'a> {
     pub max: usize,
     /// Alternatives keep this distance somewhere from every cheaper loop (in mesh units, measured along edges).
     pub separation: f64,
+    /// A loop found nearby under the same mask: the search starts from what it becomes where it passes the vertex.
+    pub nearby: Option<&'a FoundLoop>,
     /// Most search states to settle before the best so far is returned unproved. A state takes about half a
     /// microsecond.
     pub budget: u64,
@@ -54,7 +56,7 @@ pub struct ProposalQuery<'a> {
 impl<'a> ProposalQuery<'a> {
     /// The cheapest loop through a vertex, proved within about a second on ordinary meshes.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
-        Self { vertex, direction: None, mask, factor: 1.0, max: 1, separation: 0.05, budget: 4_000_000 }
+        Self { vertex, direction: None, mask, factor: 1.0, max: 1, separation: 0.05, nearby: None, budget: 4_000_000 }
     }
 
     /// The cheapest loop and up to 15 alternatives that cost at most half as much again.
@@ -130,10 +132,12 @@ impl ElasticaGraph {
             vertex: query.vertex,
             factor: query.factor.max(1.0) as f32,
         };
+        let seed = query.nearby.filter(|l| l.curve.closed && query.direction.is_none());
+        let seed = seed.and_then(|l| self.seed(query.mask, query.vertex, &l.path));
         let mut routes = Vec::new();
         let outcome = match query.direction {
             Some(direction) => search.along(direction, &mut routes),
-            None => search.all(&mut routes, watch),
+            None => search.all(seed, &mut routes, watch),
         };
         let proved = match outcome {
             Ok(()) => true,
@@ -218,15 +222,17 @@ impl LoopSearch<'_> {
         Ok(())
     }
 
-    /// The cheapest route, and those of the other start directions up to the factor.
+    /// The cheapest route, and those of the other start directions up to the factor. The search starts from `seed`, if
+    /// there is one.
     pub(super) fn all(
         &mut self,
+        seed: Option<Route>,
         routes: &mut Vec<Route>,
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<(), Stop> {
         let out: Vec<State> = self.graph.leaving(self.vertex).collect();
         routes.extend(self.open_curves(&out, f32::INFINITY, true)?);
-        let best = self.cheapest(routes, &mut watch)?;
+        let best = self.cheapest(seed, routes, &mut watch)?;
         if self.factor > 1.0
             && let Some(cost) = best.as_ref().map(|r| r.cost)
         {
@@ -239,6 +245,7 @@ impl LoopSearch<'_> {
     /// The cheapest route, proved; those that it improved on are among `routes`.
     fn cheapest(
         &mut self,
+        seed: Option<Route>,
         routes: &mut Vec<Route>,
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<Option<Route>, Stop> {
@@ -251,6 +258,14 @@ impl LoopSearch<'_> {
         let mut best = routes.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         self.start();
         let mut shown = None;
+        // It is shown at once, but proposed only if nothing is cheaper: an alternative it need not be.
+        let seed = seed.filter(|s| best.as_ref().is_none_or(|b| s.cost < b.cost));
+        if seed.is_some() {
+            best = seed;
+            shown = best.as_ref().map(|r| r.cost);
+            show(Certainty::Found, &best);
+        }
+        let seed = shown;
         let mut patience = Some(PATIENCE);
         loop {
             let grown = self.ball(&mut best, 1.0, patience.take());
@@ -271,6 +286,9 @@ impl LoopSearch<'_> {
         self.improve(&directions, &mut cost, routes)?;
         let better = routes[known..].iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         best = better.or(best);
+        if seed.is_some() && best.as_ref().map(|r| r.cost) == seed {
+            routes.extend(best.clone());
+        }
         show(Certainty::Proved, &best);
         Ok(best)
     }

@@ -185,7 +185,7 @@ fn compare(graph: &ElasticaGraph, mask: &DirectionMask, v: VertexId, factor: f32
         factor,
     };
     let mut routes = Vec::new();
-    search.all(&mut routes, |_, _| {}).unwrap();
+    search.all(None, &mut routes, |_, _| {}).unwrap();
     let out: Vec<State> = graph.leaving(v).filter(|&a| mask.is_open(a)).collect();
     let expected: Vec<f32> = out.iter().map(|&a| reference(graph, mask, a)).collect();
     let near = |a: f32, b: f32| (a - b).abs() <= 1e-4 * b;
@@ -366,6 +366,46 @@ fn every_loop_is_a_curve() {
             if found.loops.is_empty() { without += 1 } else { with += 1 }
         }
         assert!(with > 3 * without, "{name}: {without} vertices of {} without a loop", with + without);
+    }
+}
+
+#[test]
+fn a_loop_nearby_bounds_the_search_and_changes_no_result() {
+    let meshes = [Some(torus(24, 12)), real("rockerarm_1k.off"), real("bunny_1k.obj")];
+    let (mask, progress) = (DirectionMask::none(), Progress::new());
+    for g in meshes.into_iter().flatten().map(graph) {
+        let (mut work, mut seeded, mut all) = (SearchWorkspace::new(), 0, 0);
+        let mut settled = [0, 0];
+        for v in sample(&g, 12) {
+            let there = g.proposals(&ProposalQuery::cheapest(v, &mask), &mut work, &progress).unwrap();
+            let Some(nearby) = there.loops.first().filter(|l| l.curve.closed) else { continue };
+            for w in g.mesh().outgoing(v).map(|h| g.mesh().target(h)) {
+                all += 1;
+                let Some(route) = g.seed(&mask, w, &nearby.path) else { continue };
+                seeded += 1;
+                assert!((price(&g, &route) - route.cost).abs() < 1e-4 * route.cost);
+                assert_eq!(g.origin(route.states[0]), w);
+                let ring = route.states.iter().zip(route.states.iter().cycle().skip(1));
+                assert!(ring.into_iter().all(|(&e, &f)| g.follows(e, f)));
+
+                let plain = ProposalQuery::cheapest(w, &mask);
+                let alone = g.proposals(&plain, &mut work, &progress).unwrap();
+                let mut first = None;
+                let query = ProposalQuery { nearby: Some(nearby), ..plain };
+                let found = g.proposals_with(&query, &mut work, &progress, |c, l| {
+                    first.get_or_insert((c, l.cost));
+                });
+                let found = found.unwrap();
+                let cost = |p: &Proposals| p.loops.first().map(|l| l.cost);
+                let (Some(a), Some(b)) = (cost(&alone), cost(&found)) else { panic!("{w:?}: no loop") };
+                assert!((a - b).abs() < 1e-5 * a, "{w:?}: {b}, alone {a}");
+                assert!(first.is_some_and(|(c, cost)| c == Certainty::Found && cost >= a * (1.0 - 1e-5)));
+                settled[0] += alone.settled;
+                settled[1] += found.settled;
+            }
+        }
+        assert!(2 * seeded > all, "{seeded} of {all} neighbours");
+        assert!(settled[1] <= settled[0], "{settled:?} states settled");
     }
 }
 

@@ -126,7 +126,9 @@ impl Optimizer<'_> {
         list
     }
 
-    /// Lets edges go that slope more than so much against their isolines.
+    /// Lets edges go that slope more than so much against their isolines. Along a line that cannot keep to one the pull
+    /// spreads what is amiss evenly from vertex to vertex: its shortest edges slope most, and without one or two of these
+    /// the rest can follow.
     fn let_go(&mut self, slope: f64) {
         let list = self.followed();
         let State { net, solution, .. } = &self.state;

@@ -102,22 +102,22 @@ impl Ground<'_> {
     }
 
     /// The net with a node put at a crossing by one of the corners of its triangle, those first that have to move least; on
-    /// a feature by an end of that edge.
+    /// a feature that is `held` by an end of that edge.
     pub(super) fn put_at<'n>(
         &'n self,
         net: &'n Net,
         node: usize,
         at: &'n Crossing,
-        sharp: impl Fn(HalfedgeId) -> bool,
+        held: impl Fn(HalfedgeId) -> bool,
     ) -> impl Iterator<Item = Net> + 'n {
         let from = net.nodes[node].vertex;
         let sides = net.mesh.face_halfedges(at.face);
         let place = self.index.nearest(at.place).position(self.surface);
         let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
-        let on = (0..3).find(|&k| at.weights[(k + 2) % 3] == 0.0 && sharp(sides[k])).map(|k| sides[k]);
+        let on = (0..3).find(|&k| at.weights[(k + 2) % 3] == 0.0 && held(sides[k])).map(|k| sides[k]);
         let allowed = |v: VertexId| match on {
             Some(h) => (v == net.mesh.origin(h) || v == net.mesh.target(h)) && self.along(&net.mesh, v).len() == 2,
-            None => !self.on_curve[v.index()],
+            None => !net.mesh.outgoing(v).any(&held) && !net.mesh.is_boundary_vertex(v),
         };
         let mut list = net.mesh.face_vertices(at.face).to_vec();
         list.retain(|v| allowed(*v) && !taken.contains(v));

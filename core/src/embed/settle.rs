@@ -13,7 +13,7 @@ use super::cross::crossing;
 use super::descent::Optimizer;
 use super::net::Net;
 use super::relocate::Hold;
-use super::solver::Folded;
+use super::solver::{Features, Folded};
 use super::spacing::transition;
 use super::state::State;
 use super::straight::around;
@@ -78,12 +78,13 @@ impl Optimizer<'_> {
     fn at_crossings(&self, stays: &[bool]) -> (Net, Vec<usize>) {
         let mut net = self.state.net.clone();
         let mut on_feature = Vec::new();
-        for i in 0..net.nodes.len() {
-            if self.roads.held[i] || stays[i] || self.ground.hold[i] == Hold::Fixed || net.nodes[i].boundary {
+        for (i, &stays) in stays.iter().enumerate() {
+            if self.roads.held[i] || stays || self.ground.hold[i] == Hold::Fixed || net.nodes[i].boundary {
                 continue;
             }
             let Some(crossing) = self.crossing_of(i) else { continue };
-            let sharp = |h: HalfedgeId| self.sharp[net.mesh.edge(h).index()];
+            let exact = self.features == Features::Held;
+            let sharp = |h: HalfedgeId| exact && self.sharp[net.mesh.edge(h).index()];
             let from = net.nodes[i].vertex;
             let found = self.ground.put_at(&net, i, &crossing, sharp).find(|moved| self.fits(moved, from, i));
             if let Some(moved) = found {

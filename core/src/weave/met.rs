@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(company.met(&high), Met { strips: vec![0, 1], features: 0 });
         // Shaken, a ring crosses the one it was to and fro, always as often there as back.
         let shaken = company.met(&ring(&mesh, 24, 3, 0.3));
-        assert!(shaken.strips[0] > 0 && shaken.strips[0] % 2 == 0, "{shaken:?}");
+        assert!(shaken.strips[0] > 0 && shaken.strips[0].is_multiple_of(2), "{shaken:?}");
         assert_eq!(shaken.strips[1] % 2, 1);
         assert!(!shaken.no_more_than(&company.met(&high)) && company.met(&high).no_more_than(&shaken));
     }

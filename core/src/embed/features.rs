@@ -106,16 +106,43 @@ impl Optimizer<'_> {
         newton: Option<&NewtonSystem>,
         progress: &Progress,
     ) -> Result<(), EmbeddingError> {
-        let (Some(system), Some(newton), Some(shape)) = (&self.seamless, newton, self.shape) else { return Ok(()) };
         self.pull = pull;
-        let State { net, metric, field, objective, firmness, solution } = &self.state;
-        let pulled: Vec<_> = self.followed().into_iter().map(|(h, axis)| (h, axis, pull)).collect();
+        tracing::debug!(pull, "features pulled");
+        self.descend(newton, progress)
+    }
+
+    /// Lets the map without folds come to rest in the field at hand: a few steps between moves do not get so far.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn come_to_rest(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        let newton = self.newton()?;
+        self.descend(newton.as_ref(), progress)
+    }
+
+    fn descend(&mut self, newton: Option<&NewtonSystem>, progress: &Progress) -> Result<(), EmbeddingError> {
+        let (Some(system), Some(newton), Some(shape)) = (&self.seamless, newton, self.shape) else { return Ok(()) };
+        let pulled = self.pulled();
+        let State { metric, field, objective, firmness, solution, .. } = &self.state;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(&pulled);
         let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
         system.descend(newton, &energy, &mut at, STEPS, progress)?;
-        tracing::debug!(pull, edges = pulled.len(), faces = net.mesh.n_faces(), "features pulled");
         self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };
         Ok(())
+    }
+
+    /// The edges of features that are only pulled, towards isolines of which coordinate, and how hard.
+    fn pulled(&self) -> Vec<(HalfedgeId, u8, f64)> {
+        let State { net, metric, field, .. } = &self.state;
+        let list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE).into_iter();
+        let loose = |h: HalfedgeId| self.loose.get(net.mesh.edge(h).index()).copied().unwrap_or(false);
+        let strength = |h: HalfedgeId| match self.features {
+            _ if loose(h) => Some(1.0),
+            Features::Pulled => Some(self.pull),
+            Features::Held => None,
+        };
+        list.filter_map(|(h, axis)| Some((h, axis, strength(h)?))).collect()
     }
 
     /// The edges of features that follow isolines, and of which coordinate; those let go are left out.

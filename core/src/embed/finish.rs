@@ -60,6 +60,10 @@ impl Optimizer<'_> {
             self.round(edge, progress)?;
         }
         if self.shape.is_some() {
+            // On a proxy nothing is final.
+            if self.settings.exact_features {
+                self.come_to_rest(progress)?;
+            }
             return Ok(Vec::new());
         }
         self.stiffen(progress)?;

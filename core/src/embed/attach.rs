@@ -98,30 +98,36 @@ impl Optimizer<'_> {
             reached.insert(mesh.face(h), (at, None));
             queue.push_back((mesh.face(h), 0));
         }
-        let here = mesh.position(net.nodes[i].vertex);
         while let Some((f, far)) = queue.pop_front() {
             let (at, _) = reached[&f];
-            for h in mesh.face_halfedges(f) {
-                if self.sharp[mesh.edge(h).index()] {
-                    let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| map.uv[f.index()][k]);
-                    let along = (at - p).dot(q - p) / (q - p).length_squared();
-                    let across = (at - p).perp_dot(q - p).abs() / (q - p).length_squared();
-                    let width = here.distance(mesh.position(mesh.origin(h))) / mesh.vector(h).length();
-                    let near = if self.roads.held[i] { SQUEEZED * width } else { NEAR };
-                    if (0.0..=1.0).contains(&along) && across < near {
-                        let vertex = if along < 0.5 { mesh.origin(h) } else { mesh.target(h) };
-                        return self.is_free(vertex).then(|| Place { vertex, strip: strip(&reached, f) });
-                    }
-                }
-                let Some(t) = mesh.twin(h).filter(|_| far < REACH) else { continue };
-                let Some(change) = map.transition(mesh, h).filter(|_| !reached.contains_key(&mesh.face(t))) else {
-                    continue;
-                };
-                reached.insert(mesh.face(t), (change.apply(at), Some(f)));
-                queue.push_back((mesh.face(t), far + 1));
+            let sides = mesh.face_halfedges(f).into_iter();
+            let mut features = sides.clone().filter(|&h| self.sharp[mesh.edge(h).index()]);
+            if let Some(vertex) = features.find_map(|h| self.end_beside(i, h, at)) {
+                return self.is_free(vertex).then(|| Place { vertex, strip: strip(&reached, f) });
+            }
+            for h in sides.filter(|_| far < REACH) {
+                let Some(change) = map.transition(mesh, h) else { continue };
+                let Some(g) = mesh.twin(h).map(|t| mesh.face(t)).filter(|g| !reached.contains_key(g)) else { continue };
+                reached.insert(g, (change.apply(at), Some(f)));
+                queue.push_back((g, far + 1));
             }
         }
         None
+    }
+
+    /// The nearer end of an edge of a feature if a node belongs there that is to have coordinates `at` in the frame of the
+    /// edge's triangle.
+    fn end_beside(&self, i: usize, h: HalfedgeId, at: DVec2) -> Option<VertexId> {
+        let State { net, solution, .. } = &self.state;
+        let mesh = &net.mesh;
+        let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| solution.map.uv[h.index() / 3][k]);
+        let along = (at - p).dot(q - p) / (q - p).length_squared();
+        let across = (at - p).perp_dot(q - p).abs() / (q - p).length_squared();
+        // Of a node that is held the coordinates are its own, and what counts is how far it is on the surface.
+        let far = mesh.position(net.nodes[i].vertex).distance(mesh.position(mesh.origin(h))) / mesh.vector(h).length();
+        let near = if self.roads.held[i] { SQUEEZED * far } else { NEAR };
+        let end = if along < 0.5 { mesh.origin(h) } else { mesh.target(h) };
+        ((0.0..=1.0).contains(&along) && across < near).then_some(end)
     }
 
     /// Whether a vertex on a feature may have a node: no corner of features, and no other's place.

@@ -164,3 +164,61 @@ pub(super) fn heading_in(net: &Net, side: HalfedgeId, of: &Headed) -> i32 {
     }
     (of.heading - jump_across(&net.mesh, &net.jump, of.halfedge) + 2).rem_euclid(4)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::net;
+    use super::*;
+
+    #[test]
+    fn a_few_edges_across_the_field_do_not_change_the_heading_and_many_do() {
+        // Edges that follow heading 1, but for some in between that run along heading 2.
+        let line = |n: usize, from: usize, to: usize| {
+            let along = move |i: usize| if (from..to).contains(&i) { 2 } else { 1 };
+            cheapest(n, move |i, k| if k == along(i) { 0.0 } else { 1.0 })
+        };
+        assert_eq!(line(100, 40, 50), vec![1; 100]);
+        assert_eq!(line(60, 56, 60), vec![1; 60]);
+        let turned = line(100, 40, 100);
+        assert!(turned[..40].iter().all(|&k| k == 1) && turned[40..].iter().all(|&k| k == 2));
+    }
+
+    #[test]
+    fn lines_go_from_end_to_end_and_every_edge_is_on_one() {
+        let net = net();
+        let sharp: Vec<bool> = net.mesh.edges().map(|e| e.0 % 5 == 0).collect();
+        let lines = Lines::new(&net, &sharp);
+        let mut seen = vec![0; net.mesh.n_edges()];
+        for line in lines.all() {
+            for &h in &line {
+                seen[net.mesh.edge(h).index()] += 1;
+            }
+            for pair in line.windows(2) {
+                let v = net.mesh.target(pair[0]);
+                assert_eq!(v, net.mesh.origin(pair[1]));
+                assert!(!lines.ends[v.index()]);
+            }
+        }
+        for e in net.mesh.edges() {
+            assert_eq!(seen[e.index()], u32::from(sharp[e.index()] && !net.mesh.is_boundary_edge(e)));
+        }
+    }
+
+    #[test]
+    fn the_heading_is_the_direction_that_the_edge_follows() {
+        let net = net();
+        let metric = Metric::new(&net.mesh);
+        let sharp = vec![true; net.mesh.n_edges()];
+        for headed in headings(&net, &metric, &net.angle, &sharp) {
+            let h = headed.halfedge;
+            let turns = (metric.direction(h) - net.angle[net.mesh.face(h).index()]) / FRAC_PI_2;
+            let off = turns - f64::from(headed.heading);
+            assert!(((off - 4.0 * (off / 4.0).round()).abs() - headed.off).abs() < 1e-9, "{headed:?}");
+            if let Some(t) = net.mesh.twin(h) {
+                // Against the edge its heading is the opposite one, in the frame of the other triangle.
+                let back = heading_in(&net, t, &headed);
+                assert_eq!((back + jump_across(&net.mesh, &net.jump, h) + 2).rem_euclid(4), headed.heading);
+            }
+        }
+    }
+}

@@ -183,3 +183,20 @@ fn weights(corners: &[DVec2; 3], at: DVec2) -> Option<[f64; 3]> {
     let sum: f64 = cut.iter().sum();
     Some(cut.map(|w| w / sum))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_next_to_a_side_lie_on_it_and_those_outside_nowhere() {
+        let corners = [DVec2::ZERO, DVec2::new(2.0, 0.0), DVec2::new(0.0, 1.0)];
+        let inside = weights(&corners, DVec2::new(0.5, 0.25)).unwrap();
+        let at: DVec2 = corners.iter().zip(inside).map(|(p, w)| *p * w).sum();
+        assert!(at.distance(DVec2::new(0.5, 0.25)) < 1e-12);
+        let beside = weights(&corners, DVec2::new(1.0, -1e-9)).unwrap();
+        assert_eq!(beside[2], 0.0);
+        assert!((beside.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!(weights(&corners, DVec2::new(1.0, -1e-3)).is_none());
+    }
+}

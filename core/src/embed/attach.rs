@@ -5,8 +5,6 @@
 //! nothing. What is squeezed tells which nodes these are: they are brought onto the feature, along edges and with their
 //! arcs in tow, and slide along it from then on. Regular nodes follow if their crossing lies on one.
 
-use std::collections::{HashMap, VecDeque};
-
 use glam::DVec2;
 
 use super::EmbeddingError;
@@ -14,18 +12,17 @@ use super::cross::crossing;
 use super::descent::Optimizer;
 use super::net::Net;
 use super::relocate::{Hold, edge_path};
+use super::settle::outward;
 use super::state::State;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::progress::Progress;
 
-/// How many triangles far features are looked for.
-const REACH: usize = 24;
 /// To what share of its width on the surface what lies between a node and its feature is squeezed in the map.
 const SQUEEZED: f64 = 0.1;
 /// How near to an edge of a feature, in its lengths, the crossing of a regular node lies that belongs there.
 const NEAR: f64 = 0.1;
 
-/// A place on a feature: a vertex, and the triangles on the way there.
+/// A place on a feature: a vertex, and the triangles on the way back from there.
 struct Place {
     vertex: VertexId,
     strip: Vec<FaceId>,
@@ -91,28 +88,12 @@ impl Optimizer<'_> {
         } else {
             crossing(net, &self.roads, map, &self.ends[i]).into_iter().collect()
         };
-        // Where the node belongs, in the coordinates of every triangle reached, and the triangle before.
-        let mut reached: HashMap<FaceId, (DVec2, Option<FaceId>)> = HashMap::new();
-        let mut queue: VecDeque<(FaceId, usize)> = VecDeque::new();
-        for (h, at) in corners {
-            reached.insert(mesh.face(h), (at, None));
-            queue.push_back((mesh.face(h), 0));
-        }
-        while let Some((f, far)) = queue.pop_front() {
-            let (at, _) = reached[&f];
-            let sides = mesh.face_halfedges(f).into_iter();
-            let mut features = sides.clone().filter(|&h| self.sharp[mesh.edge(h).index()]);
-            if let Some(vertex) = features.find_map(|h| self.end_beside(i, h, at)) {
-                return self.is_free(vertex).then(|| Place { vertex, strip: strip(&reached, f) });
-            }
-            for h in sides.filter(|_| far < REACH) {
-                let Some(change) = map.transition(mesh, h) else { continue };
-                let Some(g) = mesh.twin(h).map(|t| mesh.face(t)).filter(|g| !reached.contains_key(g)) else { continue };
-                reached.insert(g, (change.apply(at), Some(f)));
-                queue.push_back((g, far + 1));
-            }
-        }
-        None
+        let first = corners.into_iter().map(|(h, at)| (mesh.face(h), at));
+        let (vertex, strip) = outward(net, map, first, |f, at| {
+            let features = mesh.face_halfedges(f).into_iter().filter(|&h| self.sharp[mesh.edge(h).index()]);
+            features.into_iter().find_map(|h| self.end_beside(i, h, at))
+        })?;
+        self.is_free(vertex).then_some(Place { vertex, strip })
     }
 
     /// The nearer end of an edge of a feature if a node belongs there that is to have coordinates `at` in the frame of the
@@ -136,9 +117,4 @@ impl Optimizer<'_> {
         let rays = mesh.outgoing(v).filter(|&h| self.sharp[mesh.edge(h).index()]).count();
         rays == 2 && !mesh.is_boundary_vertex(v) && self.state.net.nodes.iter().all(|n| n.vertex != v)
     }
-}
-
-/// The triangles on the way to one that was reached, that first.
-fn strip(reached: &HashMap<FaceId, (DVec2, Option<FaceId>)>, to: FaceId) -> Vec<FaceId> {
-    std::iter::successors(Some(to), |f| reached[f].1).collect()
 }

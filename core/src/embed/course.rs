@@ -167,7 +167,7 @@ impl<'w> Course<'w> {
             }
             done => return done,
         }
-        self.rest(&mut optimizer, (0.8, 0.9), progress)?;
+        self.rest(&mut optimizer, (0.8, 0.85), progress)?;
         match self.held(job, &mut optimizer, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes stay where they were");

@@ -15,6 +15,8 @@ use crate::mesh::{FaceId, HalfedgeId};
 use crate::param::{InjectiveEnergy, NewtonSystem, Solution};
 use crate::progress::Progress;
 
+/// The part of the whole work that is done by then.
+const FRACTION: f64 = 0.85;
 /// How hard features are pulled, in multiples of what is usual, until nodes that belong to them show.
 const GENTLY: [f64; 3] = [10.0, 100.0, 1e3];
 /// How often nodes are looked for and the features pulled anew.
@@ -37,6 +39,7 @@ impl Optimizer<'_> {
         if !self.settings.exact_features || self.features == Features::Held || !self.sharp.contains(&true) {
             return Ok(());
         }
+        progress.report("Bringing features onto isolines", FRACTION);
         self.synchronise(progress)?;
         let mut newton = self.newton()?;
         for _ in 0..ROUNDS {
@@ -44,8 +47,7 @@ impl Optimizer<'_> {
                 self.pull_harder(pull, newton.as_ref(), progress)?;
             }
             self.pull = GENTLY[0];
-            let count = self.attach(progress)?;
-            if count == 0 {
+            if self.attach(progress)? == 0 {
                 break;
             }
             newton = self.newton()?;
@@ -136,9 +138,8 @@ impl Optimizer<'_> {
     fn pulled(&self) -> Vec<(HalfedgeId, u8, f64)> {
         let State { net, metric, field, .. } = &self.state;
         let list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE).into_iter();
-        let loose = |h: HalfedgeId| self.loose.get(net.mesh.edge(h).index()).copied().unwrap_or(false);
         let strength = |h: HalfedgeId| match self.features {
-            _ if loose(h) => Some(1.0),
+            _ if self.is_loose(h) => Some(1.0),
             Features::Pulled => Some(self.pull),
             Features::Held => None,
         };
@@ -149,8 +150,12 @@ impl Optimizer<'_> {
     fn followed(&self) -> Vec<(HalfedgeId, u8)> {
         let State { net, metric, field, .. } = &self.state;
         let mut list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE);
-        list.retain(|&(h, _)| !self.loose.get(net.mesh.edge(h).index()).copied().unwrap_or(false));
+        list.retain(|&(h, _)| !self.is_loose(h));
         list
+    }
+
+    fn is_loose(&self, h: HalfedgeId) -> bool {
+        self.loose.get(self.state.net.mesh.edge(h).index()).copied().unwrap_or(false)
     }
 
     /// Lets edges go that slope more than so much against their isolines. Along a line that cannot keep to one the pull

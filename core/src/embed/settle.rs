@@ -22,7 +22,7 @@ use crate::param::SeamlessMap;
 use crate::progress::Progress;
 use crate::surface::nearest_in_triangle;
 
-/// How many triangles far a crossing is looked for.
+/// How many triangles far crossings and features are looked for.
 const REACH: usize = 24;
 /// Weight of a corner up to which a point lies on the opposite side.
 const ON_SIDE: f64 = 1e-6;
@@ -35,7 +35,7 @@ pub(super) struct Crossing {
     pub weights: [f64; 3],
     /// The point in space.
     pub place: DVec3,
-    /// The triangles on the way there from the node, that first where it is.
+    /// The triangles on the way back from there to the node.
     pub strip: Vec<FaceId>,
 }
 
@@ -150,21 +150,35 @@ fn read_at(net: &Net, map: &SeamlessMap, v: VertexId, place: DVec3) -> Option<(H
 }
 
 /// The point with coordinates `target` in the frame of triangle `from`, as near as can be to that.
-pub(super) fn locate(net: &Net, map: &SeamlessMap, from: FaceId, target: DVec2) -> Option<Crossing> {
+fn locate(net: &Net, map: &SeamlessMap, from: FaceId, target: DVec2) -> Option<Crossing> {
     let mesh = &net.mesh;
-    let mut reached: HashMap<FaceId, Option<FaceId>> = HashMap::from([(from, None)]);
-    let mut queue = VecDeque::from([(from, target, 0)]);
+    let inside = |f: FaceId, at: DVec2| Some((f, weights(&map.uv[f.index()], at)?));
+    let ((face, weights), strip) = outward(net, map, [(from, target)], inside)?;
+    let corners = mesh.face_vertices(face).map(|v| mesh.position(v));
+    let place = corners.iter().zip(weights).map(|(p, w)| *p * w).sum();
+    Some(Crossing { face, weights, place, strip })
+}
+
+/// Goes outward from triangles, each given with the coordinates of one and the same point in its frame, from triangle to
+/// triangle with what these coordinates become there, until something is `found`. Returned with it is the way back, from
+/// the triangle where it was found to one of the first.
+pub(super) fn outward<T>(
+    net: &Net,
+    map: &SeamlessMap,
+    first: impl IntoIterator<Item = (FaceId, DVec2)>,
+    mut found: impl FnMut(FaceId, DVec2) -> Option<T>,
+) -> Option<(T, Vec<FaceId>)> {
+    let mesh = &net.mesh;
+    let mut queue: VecDeque<(FaceId, DVec2, usize)> = first.into_iter().map(|(f, at)| (f, at, 0)).collect();
+    let mut before: HashMap<FaceId, Option<FaceId>> = queue.iter().map(|&(f, ..)| (f, None)).collect();
     while let Some((f, at, far)) = queue.pop_front() {
-        if let Some(weights) = weights(&map.uv[f.index()], at) {
-            let strip = std::iter::successors(Some(f), |f| reached[f]).collect();
-            let corners = mesh.face_vertices(f).map(|v| mesh.position(v));
-            let place = corners.iter().zip(weights).map(|(p, w)| *p * w).sum();
-            return Some(Crossing { face: f, weights, place, strip });
+        if let Some(found) = found(f, at) {
+            return Some((found, std::iter::successors(Some(f), |f| before[f]).collect()));
         }
         for h in mesh.face_halfedges(f).into_iter().filter(|_| far < REACH) {
             let Some(change) = map.transition(mesh, h) else { continue };
-            let Some(g) = mesh.twin(h).map(|t| mesh.face(t)).filter(|g| !reached.contains_key(g)) else { continue };
-            reached.insert(g, Some(f));
+            let Some(g) = mesh.twin(h).map(|t| mesh.face(t)).filter(|g| !before.contains_key(g)) else { continue };
+            before.insert(g, Some(f));
             queue.push_back((g, change.apply(at), far + 1));
         }
     }

@@ -10,6 +10,7 @@ use glam::DVec2;
 use super::EmbeddingError;
 use super::cross::crossing;
 use super::descent::Optimizer;
+use super::feature_lines;
 use super::net::Net;
 use super::relocate::{Hold, edge_path};
 use super::settle::outward;
@@ -21,6 +22,44 @@ use crate::progress::Progress;
 const SQUEEZED: f64 = 0.1;
 /// How near to an edge of a feature, in its lengths, the crossing of a regular node lies that belongs there.
 const NEAR: f64 = 0.1;
+/// How many times as far as it steps a node may be from a line of features that steps because of it.
+const STEPPED: f64 = 1.2;
+
+/// The foot of a point on an edge, in the map.
+struct Foot {
+    halfedge: HalfedgeId,
+    /// Where on the edge it is, from 0 to 1.
+    along: f64,
+    /// How far the point is from the edge's line.
+    far: f64,
+    /// The length of the edge.
+    length: f64,
+}
+
+impl Foot {
+    fn new(state: &State, halfedge: HalfedgeId, at: DVec2) -> Self {
+        let corner = |k: usize| state.solution.map.uv[halfedge.index() / 3][(halfedge.index() + k) % 3];
+        let (from, side) = (at - corner(0), corner(1) - corner(0));
+        let length = side.length();
+        Self { halfedge, along: from.dot(side) / length.powi(2), far: from.perp_dot(side).abs() / length, length }
+    }
+
+    /// How far the point is from the edge.
+    fn distance(&self) -> f64 {
+        let beyond = (self.along - self.along.clamp(0.0, 1.0)) * self.length;
+        beyond.hypot(self.far)
+    }
+
+    fn is_inside(&self) -> bool {
+        (0.0..=1.0).contains(&self.along)
+    }
+
+    /// The end of the edge that is nearer.
+    fn end(&self, state: &State) -> VertexId {
+        let mesh = &state.net.mesh;
+        if self.along < 0.5 { mesh.origin(self.halfedge) } else { mesh.target(self.halfedge) }
+    }
+}
 
 /// A place on a feature: a vertex, and the triangles on the way back from there.
 struct Place {
@@ -29,13 +68,71 @@ struct Place {
 }
 
 impl Optimizer<'_> {
-    /// Brings nodes onto the features that they belong to; returns how many.
+    /// Brings nodes onto the features from which what lies between is squeezed away; returns how many.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
     pub(super) fn attach(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
-        let places: Vec<Option<Place>> = (0..self.pace.len()).map(|i| self.place_of(i)).collect();
+        let beside = |i: usize, h: HalfedgeId, at: DVec2| self.squeezed_to(i, h, at);
+        let places = (0..self.pace.len()).map(|i| self.place_of(i, beside)).collect();
+        self.bring(places, progress)
+    }
+
+    /// Brings nodes onto lines of features that step from one isoline to another at edges let go, where they are no
+    /// farther from the line than it steps: the line leaves the isoline of such a node to pass it. Returns how many.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn attach_at_steps(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
+        let lines = self.stepping_lines();
+        let places = (0..self.pace.len()).map(|i| self.place_at_step(i, &lines)).collect();
+        self.bring(places, progress)
+    }
+
+    /// The lines of features that step at edges let go, and how far at most.
+    fn stepping_lines(&self) -> Vec<(Vec<HalfedgeId>, f64)> {
+        let State { net, solution, .. } = &self.state;
+        let mut step = vec![0.0; net.mesh.n_edges()];
+        for (h, axis) in self.aligned().into_iter().filter(|&(h, _)| self.loose[net.mesh.edge(h).index()]) {
+            let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| solution.map.uv[h.index() / 3][k]);
+            step[net.mesh.edge(h).index()] = (q - p)[usize::from(axis)].abs();
+        }
+        let farthest = |line: &[HalfedgeId]| line.iter().map(|&h| step[net.mesh.edge(h).index()]).fold(0.0, f64::max);
+        let lines = feature_lines::lines(net, &self.sharp).into_iter();
+        lines.map(|line| (farthest(&line), line)).filter(|l| l.0 > 0.0).map(|(far, line)| (line, far)).collect()
+    }
+
+    /// The place of an irregular node on one of these lines, that nearest on the surface, if it is no farther from it in
+    /// the map than the line steps.
+    fn place_at_step(&self, i: usize, lines: &[(Vec<HalfedgeId>, f64)]) -> Option<Place> {
+        let State { net, .. } = &self.state;
+        let mesh = &net.mesh;
+        if net.nodes[i].is_regular() {
+            return None;
+        }
+        let line_of =
+            |h: HalfedgeId| lines.iter().position(|(line, _)| line.iter().any(|&l| mesh.edge(l) == mesh.edge(h)));
+        let mut found = None;
+        self.place_of(i, |_, h, at| {
+            let line = line_of(h)?;
+            let near = Foot::new(&self.state, h, at).distance() <= STEPPED * lines[line].1;
+            found = near.then_some(line);
+            near.then(|| mesh.origin(h))
+        })?;
+        let from = mesh.position(net.nodes[i].vertex);
+        let far = |v: &VertexId| mesh.position(*v).distance_squared(from);
+        let vertices = lines[found?].0.iter().map(|&h| mesh.origin(h));
+        let vertex = vertices.filter(|&v| self.is_free(v)).min_by(|v, w| far(v).total_cmp(&far(w)))?;
+        let around = mesh.outgoing(net.nodes[i].vertex).map(|h| (mesh.face(h), DVec2::ZERO));
+        let at_vertex = |f: FaceId, _| mesh.face_vertices(f).contains(&vertex).then_some(());
+        let ((), strip) = outward(net, &self.state.solution.map, around, at_vertex)?;
+        Some(Place { vertex, strip })
+    }
+
+    /// Brings nodes to their places, if they have one and the map does not fold there; returns how many.
+    fn bring(&mut self, places: Vec<Option<Place>>, progress: &Progress) -> Result<usize, EmbeddingError> {
         if places.iter().all(Option::is_none) {
             return Ok(0);
         }
@@ -75,8 +172,13 @@ impl Optimizer<'_> {
         net
     }
 
-    /// The place on a feature that a free node belongs to, if any.
-    fn place_of(&self, i: usize) -> Option<Place> {
+    /// The place on a feature that a free node belongs to, if any: the first that `beside` names, given the node, an edge
+    /// of a feature and the coordinates that the node is to have in the frame of the edge's triangle.
+    fn place_of(
+        &self,
+        i: usize,
+        mut beside: impl FnMut(usize, HalfedgeId, DVec2) -> Option<VertexId>,
+    ) -> Option<Place> {
         let State { net, solution, .. } = &self.state;
         let (mesh, map) = (&net.mesh, &solution.map);
         if self.ground.hold[i] != Hold::Free {
@@ -91,24 +193,19 @@ impl Optimizer<'_> {
         let first = corners.into_iter().map(|(h, at)| (mesh.face(h), at));
         let (vertex, strip) = outward(net, map, first, |f, at| {
             let features = mesh.face_halfedges(f).into_iter().filter(|&h| self.sharp[mesh.edge(h).index()]);
-            features.into_iter().find_map(|h| self.end_beside(i, h, at))
+            features.into_iter().find_map(|h| beside(i, h, at))
         })?;
         self.is_free(vertex).then_some(Place { vertex, strip })
     }
 
-    /// The nearer end of an edge of a feature if a node belongs there that is to have coordinates `at` in the frame of the
-    /// edge's triangle.
-    fn end_beside(&self, i: usize, h: HalfedgeId, at: DVec2) -> Option<VertexId> {
-        let State { net, solution, .. } = &self.state;
-        let mesh = &net.mesh;
-        let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| solution.map.uv[h.index() / 3][k]);
-        let along = (at - p).dot(q - p) / (q - p).length_squared();
-        let across = (at - p).perp_dot(q - p).abs() / (q - p).length_squared();
+    /// The nearer end of an edge of a feature if a node belongs there because what lies between is squeezed.
+    fn squeezed_to(&self, i: usize, h: HalfedgeId, at: DVec2) -> Option<VertexId> {
+        let mesh = &self.state.net.mesh;
+        let foot = Foot::new(&self.state, h, at);
         // Of a node that is held the coordinates are its own, and what counts is how far it is on the surface.
-        let far = mesh.position(net.nodes[i].vertex).distance(mesh.position(mesh.origin(h))) / mesh.vector(h).length();
-        let near = if self.roads.held[i] { SQUEEZED * far } else { NEAR };
-        let end = if along < 0.5 { mesh.origin(h) } else { mesh.target(h) };
-        ((0.0..=1.0).contains(&along) && across < near).then_some(end)
+        let far = mesh.position(self.state.net.nodes[i].vertex).distance(mesh.position(mesh.origin(h)));
+        let near = if self.roads.held[i] { SQUEEZED * far / mesh.vector(h).length() } else { NEAR };
+        (foot.is_inside() && foot.far < near * foot.length).then(|| foot.end(&self.state))
     }
 
     /// Whether a vertex on a feature may have a node: no corner of features, and no other's place.

@@ -35,6 +35,11 @@ pub(super) fn headings(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]
     all
 }
 
+/// The lines of all features, each as half-edges from corner to corner or node to node, or once around.
+pub(super) fn lines(net: &Net, sharp: &[bool]) -> Vec<Vec<HalfedgeId>> {
+    Lines::new(net, sharp).all()
+}
+
 /// The features of a mesh as a graph.
 struct Lines<'a> {
     net: &'a Net,

@@ -9,6 +9,7 @@
 use super::EmbeddingError;
 use super::alignment::{self, WHOLE};
 use super::descent::Optimizer;
+use super::feature_lines;
 use super::solver::{Features, Folded};
 use super::state::State;
 use crate::mesh::{FaceId, HalfedgeId};
@@ -26,6 +27,8 @@ const ROUNDS: usize = 3;
 const HARD: [(f64, f64); 3] = [(1e3, 0.2), (1e4, 0.1), (1e6, 0.02)];
 /// Steps of Newton's method each time.
 const STEPS: usize = 15;
+/// The share of a line of features that, let go, breaks it.
+const BROKEN: f64 = 0.2;
 /// How often features are let go where the map would fold even so, each time a ring of triangles farther around.
 const LOOSENINGS: usize = 6;
 
@@ -52,12 +55,35 @@ impl Optimizer<'_> {
             }
             newton = self.newton()?;
         }
-        for (pull, slope) in HARD {
-            self.pull_harder(pull, newton.as_ref(), progress)?;
-            self.let_go(slope);
+        let mut lost = self.pull_hard(newton.as_ref(), progress)?;
+        while lost > 0 {
+            let before = (self.state.clone(), self.ground.hold.clone(), self.loose.clone());
+            let brought = self.attach_at_steps(progress)?;
+            if brought > 0 {
+                self.loose.clear();
+                let newton = self.newton()?;
+                self.pull_harder(GENTLY[GENTLY.len() - 1], newton.as_ref(), progress)?;
+                let now = self.pull_hard(newton.as_ref(), progress)?;
+                tracing::debug!(before = lost, now, "edges of features let go");
+                if now < lost {
+                    lost = now;
+                    continue;
+                }
+            }
+            (self.state, self.ground.hold, self.loose) = before;
+            break;
         }
         self.features = Features::Held;
         self.solve_loosening(progress)
+    }
+
+    /// Pulls features as hard as can be; returns how many edges had to be let go.
+    fn pull_hard(&mut self, newton: Option<&NewtonSystem>, progress: &Progress) -> Result<usize, EmbeddingError> {
+        for (pull, slope) in HARD {
+            self.pull_harder(pull, newton, progress)?;
+            self.let_go(slope);
+        }
+        Ok(self.loose.iter().filter(|&&l| l).count())
     }
 
     /// Solves for field and map where the nodes are; where features fold the map these are let go.
@@ -136,22 +162,18 @@ impl Optimizer<'_> {
 
     /// The edges of features that are only pulled, towards isolines of which coordinate, and how hard.
     fn pulled(&self) -> Vec<(HalfedgeId, u8, f64)> {
-        let State { net, metric, field, .. } = &self.state;
-        let list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE).into_iter();
         let strength = |h: HalfedgeId| match self.features {
             _ if self.is_loose(h) => Some(1.0),
             Features::Pulled => Some(self.pull),
             Features::Held => None,
         };
-        list.filter_map(|(h, axis)| Some((h, axis, strength(h)?))).collect()
+        self.aligned().into_iter().filter_map(|(h, axis)| Some((h, axis, strength(h)?))).collect()
     }
 
-    /// The edges of features that follow isolines, and of which coordinate; those let go are left out.
-    fn followed(&self) -> Vec<(HalfedgeId, u8)> {
+    /// The edges of features, and the isolines of which coordinate they are to follow, those let go as well.
+    pub(super) fn aligned(&self) -> Vec<(HalfedgeId, u8)> {
         let State { net, metric, field, .. } = &self.state;
-        let mut list = alignment::features(net, metric, &field.angle, &self.sharp, WHOLE);
-        list.retain(|&(h, _)| !self.is_loose(h));
-        list
+        alignment::features(net, metric, &field.angle, &self.sharp, WHOLE)
     }
 
     fn is_loose(&self, h: HalfedgeId) -> bool {
@@ -162,7 +184,8 @@ impl Optimizer<'_> {
     /// spreads what is amiss evenly from vertex to vertex: its shortest edges slope most, and without one or two of these
     /// the rest can follow.
     fn let_go(&mut self, slope: f64) {
-        let list = self.followed();
+        let mut list = self.aligned();
+        list.retain(|&(h, _)| !self.is_loose(h));
         let State { net, solution, .. } = &self.state;
         self.loose.resize(net.mesh.n_edges(), false);
         let mut count = 0;
@@ -175,6 +198,20 @@ impl Optimizer<'_> {
             }
         }
         tracing::debug!(count, "edges of features let go that keep slanting");
+        self.let_go_broken();
+    }
+
+    /// Lets lines go of which much has been let go: to hold the pieces left costs shape, and they make no line.
+    fn let_go_broken(&mut self) {
+        let State { net, .. } = &self.state;
+        for line in feature_lines::lines(net, &self.sharp) {
+            let edges = || line.iter().map(|&h| net.mesh.edge(h));
+            let all: f64 = edges().map(|e| net.mesh.edge_length(e)).sum();
+            let gone: f64 = edges().filter(|e| self.loose[e.index()]).map(|e| net.mesh.edge_length(e)).sum();
+            if gone > BROKEN * all {
+                edges().for_each(|e| self.loose[e.index()] = true);
+            }
+        }
     }
 
     /// Lets the features around triangles that fold, so many rings far, be pulled only.
@@ -190,6 +227,7 @@ impl Optimizer<'_> {
         for e in mesh.edges().filter(|e| self.sharp[e.index()]) {
             self.loose[e.index()] |= mesh.edge_vertices(e).iter().any(|v| near[v.index()]);
         }
+        self.let_go_broken();
         tracing::debug!(loose = self.loose.iter().filter(|&&l| l).count(), "features let go where the map would fold");
     }
 }

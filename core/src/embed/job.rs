@@ -142,13 +142,15 @@ pub struct EmbeddingReport {
 }
 
 /// Sharp edges inside the surface, on the mesh that the layout is embedded on, which may be finer than that given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeatureEdges {
     /// How many there are.
     pub all: usize,
     /// How many lie on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which the
     /// surface's bounding-box diagonal is 1.
     pub on_isolines: usize,
+    /// The ends of those that do not.
+    pub off: Vec<[[f64; 3]; 2]>,
 }
 
 /// A layout with its optimised embedding.

@@ -55,16 +55,18 @@ impl State {
         each.iter().map(|r| r.energy).sum()
     }
 
-    /// How many of the edges that are `sharp` lie on isolines.
+    /// Which of the edges that are `sharp` lie on isolines.
     pub(super) fn features(&self, sharp: &[bool]) -> FeatureEdges {
         let (mesh, uv) = (&self.net.mesh, &self.solution.map.uv);
-        let inner = || mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e));
-        let on_isoline = |&e: &EdgeId| {
+        let inner: Vec<EdgeId> = mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e)).collect();
+        let is_off = |&e: &EdgeId| {
             let h = mesh.halfedge(e).index();
             let [p, q] = [h % 3, (h + 1) % 3].map(|k| uv[h / 3][k]);
-            (p - q).abs().min_element() <= SAME
+            (p - q).abs().min_element() > SAME
         };
-        FeatureEdges { all: inner().count(), on_isolines: inner().filter(on_isoline).count() }
+        let ends = |e: EdgeId| mesh.edge_vertices(e).map(|v| mesh.position(v).to_array());
+        let off: Vec<_> = inner.iter().copied().filter(is_off).map(ends).collect();
+        FeatureEdges { all: inner.len(), on_isolines: inner.len() - off.len(), off }
     }
 
     pub(super) fn chains(&self) -> Vec<ArcChain<'_>> {

@@ -17,7 +17,7 @@ use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
 /// Scaled Jacobian below which a quad is worth mending: its angles are off by more than 45°.
-const POOR: f64 = 0.7;
+const POOR: f64 = 0.8;
 /// Rounds over all vertices of such quads.
 const ROUNDS: usize = 12;
 /// How far a vertex tries to go, in shares of the shortest side around, and in how many directions.

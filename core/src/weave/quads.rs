@@ -9,12 +9,19 @@ use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{Held, QuadMesh, Stops, land, mend, quality, refine, smooth};
+use crate::quad::{Held, QuadMesh, Stops, land, mend, quality, refine, scaled_jacobians, smooth};
 use crate::surface::{SurfacePoint, nearest_in_triangle};
 
 /// How near to a sharp edge a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the width that can be
 /// seen.
 const ON_FEATURE: f64 = 1e-4;
+/// Scaled Jacobian below which a quad is flat, how often those are let go that hold such a quad, and how many rings of
+/// quads around.
+const FLAT: f64 = 0.3;
+const RELEASES: usize = 3;
+const RELEASED_RINGS: usize = 2;
+/// Vertices in a row on a feature from which on quads resolve it.
+const RESOLVED: usize = 8;
 
 /// The refinement of an embedded layout, on the surface.
 pub(super) fn quads(
@@ -42,10 +49,14 @@ pub(super) fn quads(
     let aligned = optimised && surface.sharp.contains(&true);
     if !aligned || sketch.proxy.is_none() || quality(&quads).0 > 0 {
         let mut held = if aligned && sketch.proxy.is_none() { on_features(&quads, &surface) } else { Vec::new() };
+        let refined = quads.clone();
         smooth(&mut quads, mesh, &held, progress)?;
-        // A fold is worse than a vertex beside its feature.
-        if held.contains(&true) && quality(&quads).0 > 0 {
-            held.clear();
+        // A flat or folded quad is worse than a vertex beside its feature.
+        for _ in 0..RELEASES {
+            if !release(&quads, &surface, &mut held) {
+                break;
+            }
+            quads.clone_from(&refined);
             smooth(&mut quads, mesh, &held, progress)?;
         }
         let on_line = |p, f| is_on_feature(p, f, &surface);
@@ -54,9 +65,63 @@ pub(super) fn quads(
     Ok(quads)
 }
 
-/// For each vertex of quads on a surface whether it lies on a sharp edge.
+/// For each vertex of quads on a surface whether it is to stay on the feature that it lies on: sides of quads lead along
+/// that from vertex to vertex, and go on. What lies there by chance, or on a crease too short for the quads, is free.
 fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
-    quads.positions.iter().zip(&quads.base_face).map(|(&p, &f)| is_on_feature(p, f, surface)).collect()
+    let on: Vec<bool> =
+        quads.positions.iter().zip(&quads.base_face).map(|(&p, &f)| is_on_feature(p, f, surface)).collect();
+    let mut along = vec![Vec::new(); on.len()];
+    for [a, b] in quads.quads.iter().flat_map(|q| (0..4).map(|k| [q[k], q[(k + 1) % 4]])) {
+        if on[a as usize] && on[b as usize] {
+            along[a as usize].push(b);
+            along[b as usize].push(a);
+        }
+    }
+    let mut held = vec![false; on.len()];
+    let mut seen: Vec<bool> = on.iter().map(|on| !on).collect();
+    for first in 0..on.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        let mut line = vec![first as u32];
+        let mut next = 0;
+        while let Some(&v) = line.get(next) {
+            next += 1;
+            line.extend(along[v as usize].iter().filter(|&&w| !std::mem::replace(&mut seen[w as usize], true)));
+        }
+        if line.len() >= RESOLVED {
+            line.iter().for_each(|&v| held[v as usize] = true);
+        }
+    }
+    held
+}
+
+/// Lets the vertices of flat and folded quads go that are held on features, and those next to them, but for corners of
+/// features; tells whether there are any.
+fn release(quads: &QuadMesh, surface: &Surface<'_>, held: &mut [bool]) -> bool {
+    let flat = scaled_jacobians(quads).into_iter().zip(&quads.quads).filter(|(s, _)| *s < FLAT);
+    let mut near = vec![false; held.len()];
+    flat.flat_map(|(_, q)| q).filter(|&&v| (v as usize) < held.len()).for_each(|&v| near[v as usize] = true);
+    for _ in 0..RELEASED_RINGS {
+        let touching = quads.quads.iter().filter(|q| q.iter().any(|&v| near.get(v as usize) == Some(&true)));
+        let ring: Vec<u32> = touching.flatten().copied().collect();
+        ring.into_iter().for_each(|v| near[v as usize] = true);
+    }
+    let mut any = false;
+    for v in (0..held.len()).filter(|&v| near[v]) {
+        if held[v] && !is_corner(quads.positions[v], quads.base_face[v], surface) {
+            (held[v], any) = (false, true);
+        }
+    }
+    any
+}
+
+/// Whether a place in a triangle is that of a vertex at which features meet or end.
+fn is_corner(p: DVec3, f: u32, surface: &Surface<'_>) -> bool {
+    let mesh = surface.mesh;
+    let rays = |v| mesh.outgoing(v).filter(|&h| surface.sharp[mesh.edge(h).index()]).count();
+    let near = mesh.face_vertices(FaceId(f)).into_iter().filter(|&v| mesh.position(v).distance(p) < ON_FEATURE);
+    near.into_iter().any(|v| rays(v) != 2)
 }
 
 /// Whether a place in a triangle lies on a sharp edge of it or of its neighbours.

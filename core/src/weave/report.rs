@@ -145,7 +145,7 @@ struct Course {
     /// Chords that were collapsed, in order, and those that were to be and could not be.
     collapsed: Vec<CollapsedChord>,
     short: Vec<ShortChord>,
-    /// Edges of features, and how many of them lie on isolines.
+    /// Edges of features, and which of them do not lie on isolines.
     features: FeatureEdges,
 }
 
@@ -268,23 +268,17 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
     let (measures, patches, _) = measure_patches(&e.maps, &e.before.bending);
     let done = e.optimised.as_ref().and_then(|result| result.as_ref().ok());
     let scale = loaded.units.scale;
+    let in_file = |at: [f64; 3]| loaded.units.to_file(DVec3::from_array(at)).to_array();
     let course = done.map(|r| Course {
         steps: r.steps,
         energy_before: r.energy_before,
         energy_after: r.energy_after,
         flipped_before: r.flipped_before,
         flipped_at_rest: r.flipped_at_rest,
-        folds: r
-            .folds
-            .iter()
-            .map(|f| FoldSection {
-                at: loaded.units.to_file(DVec3::from_array(f.at)).to_array(),
-                reason: f.reason.clone(),
-            })
-            .collect(),
+        folds: r.folds.iter().map(|f| FoldSection { at: in_file(f.at), reason: f.reason.clone() }).collect(),
         collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
         short: r.short.iter().map(|c| ShortChord { length: c.length * scale, ..c.clone() }).collect(),
-        features: r.features,
+        features: FeatureEdges { off: r.features.off.iter().map(|ends| ends.map(in_file)).collect(), ..r.features },
     });
     let patch = |p: &crate::embed::PatchMeasures| PatchSection {
         aspect: p.aspect,

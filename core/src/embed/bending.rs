@@ -25,7 +25,7 @@ pub fn face_curvature(
 }
 
 /// The second fundamental form `II(a, b)`, for vectors tangent to the surface.
-pub(super) fn second_form(c: &PrincipalCurvature, a: DVec3, b: DVec3) -> f64 {
+pub fn second_form(c: &PrincipalCurvature, a: DVec3, b: DVec3) -> f64 {
     c.k_min * a.dot(c.d_min) * b.dot(c.d_min) + c.k_max * a.dot(c.d_max) * b.dot(c.d_max)
 }
 

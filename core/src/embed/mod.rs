@@ -55,7 +55,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
-pub use bending::face_curvature;
+pub use bending::{face_curvature, second_form};
 pub use collapse::{CollapsedChord, ShortChord};
 pub use descent::Optimizer;
 pub use emerge::{EmergeError, Emerged, emerge};

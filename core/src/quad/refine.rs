@@ -146,7 +146,12 @@ mod tests {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
         assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let mesh = refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, whole / (target * target)));
+        let mesh = refine(
+            &layout,
+            &embedding,
+            &maps,
+            &Stops::on_surface(&layout, &maps, |_, _| 0.0, whole / (target * target)),
+        );
         (layout, mesh)
     }
 

@@ -2,11 +2,14 @@
 //!
 //! All patches of a strip share the lines that run along it, so that these are chosen once for each chord. At even steps
 //! of the map a limb whose image is small would get few quads, and a map that keeps angles makes such images. Hence lines
-//! are placed where they keep edges short on the surface: least is `Σ ∫ (h_u² + h_v²) dA` with the lengths `h` of a quad's
-//! edges, for the number of quads wanted. With `L` the length on the surface of a way
-//! across the whole chord at the rate of the place, and `e(t) = ∫ L² dA` over the line at share `t` of the chord's width, the
+//! are placed where they keep edges short on the surface: least is `Σ ∫ (h_u² (1 + β_u) + h_v² (1 + β_v)) dA` with the lengths
+//! `h` of a quad's edges, for the number of quads wanted. `β` is the surface's curvature along them over its mean: an edge of
+//! length `h` leaves the surface by `κ h² / 8`. With `L` the length on the surface of a way
+//! across the whole chord at the rate of the place, and `e(t) = ∫ L² (1 + β) dA` over the line at share `t` of the chord's width, the
 //! best density of lines is `e^⅓`; then the integral is `E / n²` for `n` quads across, where `E = (∫ e^⅓ dt)³`, and with
 //! `Q` quads along the strip, `n³ Q` is proportional to `E`. Directions, and so angles, are those of the map all the same.
+
+use glam::DVec3;
 
 use crate::layout::{Patch, PatchMap, QuadLayout};
 use crate::mesh::FaceId;
@@ -18,6 +21,10 @@ const EXTREME: f64 = 2.0;
 /// By what factor a way across a patch may be longer than the mean: a triangle whose image is next to nothing says nothing
 /// of lines that miss it.
 const LONGEST: f64 = 4.0;
+/// How much the bend of the surface counts, at its mean, beside evenness; and how many times the mean counts at most: a crease
+/// bends without end.
+const BENT: f64 = 1.0;
+const SHARPEST: f64 = 5.0;
 /// Fewest quads across a chord: with three no two quads share two edges and none touches itself, however small the layout.
 const FEWEST: u32 = 3;
 /// Most quads across a chord.
@@ -45,10 +52,12 @@ impl Stops {
         Self::new(layout, directions(layout), &vec![vec![1.0; PARTS]; counts.len()], counts)
     }
 
-    /// About so many quads in all, of edges as even on the surface as can be.
-    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], quads: f64) -> Self {
+    /// About so many quads in all, of edges as short on the surface as can be, above all where and along which it bends:
+    /// `bend` is how sharply it does, as curvature, at a triangle of the original mesh in a direction.
+    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], bend: impl Fn(u32, DVec3) -> f64, quads: f64) -> Self {
         let agrees = directions(layout);
-        let density: Vec<Vec<f64>> = spread(layout, maps, &agrees).iter().map(|parts| densities(parts)).collect();
+        let parts = spread(layout, maps, &bend, &agrees);
+        let density: Vec<Vec<f64>> = parts.iter().map(|parts| densities(parts)).collect();
         let cost = |d: &Vec<f64>| (d.iter().sum::<f64>() / PARTS as f64).powi(3);
         let counts = counts(layout, &density.iter().map(cost).collect::<Vec<f64>>(), quads);
         Self::new(layout, agrees, &density, &counts)
@@ -150,15 +159,22 @@ fn counts(layout: &QuadLayout, cost: &[f64], all: f64) -> Vec<u32> {
     rounded(nearest.unwrap_or(1.0))
 }
 
-/// For each chord the integrals of `L²` over parts of its width, all along the strip.
-fn spread(layout: &QuadLayout, maps: &[PatchMap], agrees: &[bool]) -> Vec<[f64; PARTS]> {
+/// For each chord the integrals of `L² (1 + β)` over parts of its width, all along the strip.
+fn spread(
+    layout: &QuadLayout,
+    maps: &[PatchMap],
+    bend: &impl Fn(u32, DVec3) -> f64,
+    agrees: &[bool],
+) -> Vec<[f64; PARTS]> {
+    let usual = usual_bend(maps, bend);
+    let weight = |base: u32, along: DVec3| 1.0 + BENT * (bend(base, along) / usual).min(SHARPEST);
     let mut sums = vec![[0.0; PARTS]; layout.chords];
     for (patch, map) in layout.patches.iter().zip(maps) {
         for axis in 0..2 {
             let (arc, forward) = patch.sides[axis];
             let agrees = agrees[arc as usize] == forward;
             let parts = &mut sums[layout.arcs[arc as usize].chord as usize];
-            each_step(map, axis, |corners, length, area| {
+            each_step(map, axis, &weight, |corners, length, area| {
                 let corners = if agrees { corners } else { corners.map(|t| 1.0 - t) };
                 let mut below = 0.0;
                 for (k, sum) in parts.iter_mut().enumerate() {
@@ -187,9 +203,24 @@ fn share_below(mut corners: [f64; 3], value: f64) -> f64 {
     }
 }
 
+/// The mean of how sharply the surface bends along the isolines of all patches.
+fn usual_bend(maps: &[PatchMap], bend: &impl Fn(u32, DVec3) -> f64) -> f64 {
+    let (mut all, mut area) = (0.0, 0.0);
+    for (map, axis) in maps.iter().flat_map(|map| [(map, 0), (map, 1)]) {
+        each_step(map, axis, &|base, along| bend(base, along), |_, _, bent| all += bent);
+        area += map.mesh.faces().map(|f| map.mesh.face_area(f)).sum::<f64>();
+    }
+    (all / area).max(f64::MIN_POSITIVE)
+}
+
 /// Shows every triangle of a patch: one coordinate of its corners, as shares of the whole; the length on the surface of the
-/// whole way at its rate; and its area on the surface.
-fn each_step(map: &PatchMap, axis: usize, mut visit: impl FnMut([f64; 3], f64, f64)) {
+/// whole way at its rate; and its area on the surface, times what `weight` says of its base and that way's direction.
+fn each_step(
+    map: &PatchMap,
+    axis: usize,
+    weight: &impl Fn(u32, DVec3) -> f64,
+    mut visit: impl FnMut([f64; 3], f64, f64),
+) {
     let other = 1 - axis;
     let step = |f: FaceId| {
         let corners = map.mesh.face_vertices(f);
@@ -199,14 +230,18 @@ fn each_step(map: &PatchMap, axis: usize, mut visit: impl FnMut([f64; 3], f64, f
         let along = ((q - p) * (c - a)[other] - (r - p) * (b - a)[other]) / image;
         let length = along.length() * map.size[axis];
         let shares = [a, b, c].map(|w| (w[axis] / map.size[axis]).clamp(0.0, 1.0));
-        (image > 0.0 && length.is_finite()).then_some((shares, length, image))
+        (image > 0.0 && length.is_finite()).then_some((shares, along, length, image))
     };
-    let sum = |(s, t): (f64, f64), (_, length, image): ([f64; 3], f64, f64)| (s + length * image, t + image);
-    let (total, images) = map.mesh.faces().filter_map(step).fold((0.0, 0.0), sum);
+    let (mut total, mut images) = (0.0, 0.0);
+    for (_, _, length, image) in map.mesh.faces().filter_map(step) {
+        total += length * image;
+        images += image;
+    }
     let longest = LONGEST * total / images;
     for f in map.mesh.faces() {
-        if let Some((shares, length, _)) = step(f) {
-            visit(shares, length.min(longest), map.mesh.face_area(f));
+        if let Some((shares, along, length, _)) = step(f) {
+            let area = map.mesh.face_area(f) * weight(map.base_face[f.index()], along.normalize_or_zero());
+            visit(shares, length.min(longest), area);
         }
     }
 }

@@ -13,7 +13,7 @@ use super::quads::quads;
 use super::report::{Before, Subject, Times, write_report};
 use super::session::{Session, WeaveError};
 use crate::embed::{
-    self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings,
+    self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings, second_form,
 };
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, TriMesh, write_obj};
@@ -217,7 +217,8 @@ pub fn finish(
             QuadSize::EdgeLength(_) => area / (edge * edge),
             QuadSize::Count(n) => f64::from(n),
         };
-        Stops::on_surface(&layout, &maps, number)
+        let bend = |base: u32, along| second_form(&before.bending[base as usize], along, along).abs();
+        Stops::on_surface(&layout, &maps, bend, number)
     };
     let quads = quads(sketch, (&layout, &embedding, &maps), done, &stops, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());

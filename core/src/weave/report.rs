@@ -30,7 +30,7 @@ pub struct Before {
     /// Its measures, with patches mapped one by one; `None` where that cannot be done.
     pub measures: Option<Measures>,
     /// Principal curvatures of the triangles of the surface.
-    bending: Vec<PrincipalCurvature>,
+    pub(super) bending: Vec<PrincipalCurvature>,
 }
 
 impl Before {

@@ -23,7 +23,7 @@ const EXTREME: f64 = 2.0;
 const LONGEST: f64 = 4.0;
 /// How much the bend of the surface counts, at its mean, beside evenness; and how many times the mean counts at most: a crease
 /// bends without end.
-const BENT: f64 = 1.0;
+const BENT: f64 = 3.0;
 const SHARPEST: f64 = 5.0;
 /// Fewest quads across a chord: with three no two quads share two edges and none touches itself, however small the layout.
 const FEWEST: u32 = 3;

@@ -58,13 +58,13 @@ fn features_are_isolines_exactly() {
     if support::meshes().is_none() {
         return;
     }
-    // On the fan disk two edges of a rounded corner are let go, on the joint none.
-    for (name, loose) in [("fandisk_14k_fine", 0.0), ("joint_42k", 0.0)] {
+    for name in ["fandisk_14k_fine", "joint_42k"] {
         let folder = tempfile::tempdir().unwrap();
         let report = embed(&script(name), folder.path(), &["--quiet"]);
         let features = &report["layout"]["embedding"]["features"];
         let (all, held) = (number(features, "all"), number(features, "on_isolines"));
-        assert!(all > 500.0 && all - held <= loose, "{name}: {features}");
+        assert!(all > 500.0 && all == held, "{name}: {features}");
+        assert_eq!(features["off"], json!([]));
         assert_eq!(report["layout"]["embedding"]["flipped"], 0);
     }
 }

@@ -215,3 +215,19 @@ impl Optimizer<'_> {
         rays == 2 && !mesh.is_boundary_vertex(v) && self.state.net.nodes.iter().all(|n| n.vertex != v)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::net;
+    use super::*;
+
+    #[test]
+    fn a_point_is_as_far_from_an_edge_as_from_its_nearest_point() {
+        let halfedge = net().mesh.halfedges().next().unwrap();
+        let at = |along: f64, far: f64| Foot { halfedge, along, far, length: 2.0 };
+        assert_eq!(at(0.3, 0.5).distance(), 0.5);
+        assert!(at(0.3, 0.5).is_inside() && !at(1.2, 0.0).is_inside());
+        assert!((at(1.2, 0.3).distance() - 0.5).abs() < 1e-12);
+        assert!((at(-0.2, 0.3).distance() - 0.5).abs() < 1e-12);
+    }
+}

@@ -135,6 +135,15 @@ mod tests {
     use crate::testing::{column, row, square, torus};
 
     fn quads(mesh: &TriMesh, curves: &[SurfaceCurve], target: f64) -> (QuadLayout, QuadMesh) {
+        bent_quads(mesh, curves, target, |_, _| 0.0)
+    }
+
+    fn bent_quads(
+        mesh: &TriMesh,
+        curves: &[SurfaceCurve],
+        target: f64,
+        bend: impl Fn(u32, DVec3) -> f64,
+    ) -> (QuadLayout, QuadMesh) {
         let arrangement = Arrangement::new(mesh, curves).unwrap();
         let reports = assess(&arrangement, &vertex_curvatures(mesh), &[]);
         assert!(reports.iter().all(|r| r.colour != Colour::Red), "{reports:?}");
@@ -146,12 +155,8 @@ mod tests {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
         assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let mesh = refine(
-            &layout,
-            &embedding,
-            &maps,
-            &Stops::on_surface(&layout, &maps, |_, _| 0.0, whole / (target * target)),
-        );
+        let mesh =
+            refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, bend, whole / (target * target)));
         (layout, mesh)
     }
 
@@ -194,5 +199,27 @@ mod tests {
         let (layout, q) = quads(&torus(24, 12), &curves, 0.03);
         assert_eq!((layout.nodes.len(), layout.patches.len(), layout.n_irregular()), (9, 9, 0));
         assert_eq!(euler(&q), 0);
+    }
+
+    #[test]
+    fn quads_are_narrow_along_which_the_surface_bends() {
+        let curves = [row(8, 2, false, 0.5), column(8, 8, 3, false, 0.5)];
+        let (_, even) = bent_quads(&square(8), &curves, 0.05, |_, _| 2.0);
+        let (_, bent) = bent_quads(&square(8), &curves, 0.05, |_, along| 2.0 * along.x.abs());
+        let sides = |mesh: &QuadMesh| {
+            let reach = |axis: usize| {
+                let of = |q: &[u32; 4]| {
+                    let along = q.map(|v| mesh.positions[v as usize][axis]);
+                    along.iter().fold(f64::MIN, |a, b| a.max(*b)) - along.iter().fold(f64::MAX, |a, b| a.min(*b))
+                };
+                mesh.quads.iter().map(of).sum::<f64>() / mesh.quads.len() as f64
+            };
+            (reach(0), reach(1))
+        };
+        let (x, y) = sides(&even);
+        assert!((x - y).abs() < 1e-6, "the same bend everywhere changes nothing: {x} {y}");
+        let (x, y) = sides(&bent);
+        assert!(x < 0.8 * y, "{x} {y}");
+        assert!((bent.quads.len() as f64 / even.quads.len() as f64 - 1.0).abs() < 0.1);
     }
 }

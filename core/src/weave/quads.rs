@@ -53,7 +53,8 @@ pub(super) fn quads(
         smooth(&mut quads, mesh, &held, progress)?;
         // A flat or folded quad is worse than a vertex beside its feature.
         for _ in 0..RELEASES {
-            if !release(&quads, &surface, &mut held) {
+            let is_corner = |v: usize| is_corner(quads.positions[v], quads.base_face[v], &surface);
+            if !release(&quads, is_corner, &mut held) {
                 break;
             }
             quads.clone_from(&refined);
@@ -65,13 +66,18 @@ pub(super) fn quads(
     Ok(quads)
 }
 
-/// For each vertex of quads on a surface whether it is to stay on the feature that it lies on: sides of quads lead along
-/// that from vertex to vertex, and go on. What lies there by chance, or on a crease too short for the quads, is free.
+/// For each vertex of quads on a surface whether it is to stay on the feature that it lies on.
 fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
-    let on: Vec<bool> =
-        quads.positions.iter().zip(&quads.base_face).map(|(&p, &f)| is_on_feature(p, f, surface)).collect();
+    let places = quads.positions.iter().zip(&quads.base_face);
+    let on: Vec<bool> = places.map(|(&p, &f)| is_on_feature(p, f, surface)).collect();
+    resolved(&on, &quads.quads)
+}
+
+/// Which of the vertices on features are in rows along sides of quads, long enough to be seen: what lies there by chance, or
+/// on a crease too short for the quads, is not.
+fn resolved(on: &[bool], quads: &[[u32; 4]]) -> Vec<bool> {
     let mut along = vec![Vec::new(); on.len()];
-    for [a, b] in quads.quads.iter().flat_map(|q| (0..4).map(|k| [q[k], q[(k + 1) % 4]])) {
+    for [a, b] in quads.iter().flat_map(|q| (0..4).map(|k| [q[k], q[(k + 1) % 4]])) {
         if on[a as usize] && on[b as usize] {
             along[a as usize].push(b);
             along[b as usize].push(a);
@@ -83,14 +89,14 @@ fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
         if std::mem::replace(&mut seen[first], true) {
             continue;
         }
-        let mut line = vec![first as u32];
+        let mut row = vec![first as u32];
         let mut next = 0;
-        while let Some(&v) = line.get(next) {
+        while let Some(&v) = row.get(next) {
             next += 1;
-            line.extend(along[v as usize].iter().filter(|&&w| !std::mem::replace(&mut seen[w as usize], true)));
+            row.extend(along[v as usize].iter().filter(|&&w| !std::mem::replace(&mut seen[w as usize], true)));
         }
-        if line.len() >= RESOLVED {
-            line.iter().for_each(|&v| held[v as usize] = true);
+        if row.len() >= RESOLVED {
+            row.iter().for_each(|&v| held[v as usize] = true);
         }
     }
     held
@@ -98,19 +104,19 @@ fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
 
 /// Lets the vertices of flat and folded quads go that are held on features, and those next to them, but for corners of
 /// features; tells whether there are any.
-fn release(quads: &QuadMesh, surface: &Surface<'_>, held: &mut [bool]) -> bool {
+fn release(quads: &QuadMesh, is_corner: impl Fn(usize) -> bool, held: &mut [bool]) -> bool {
     let flat = scaled_jacobians(quads).into_iter().zip(&quads.quads).filter(|(s, _)| *s < FLAT);
-    let mut near = vec![false; held.len()];
-    flat.flat_map(|(_, q)| q).filter(|&&v| (v as usize) < held.len()).for_each(|&v| near[v as usize] = true);
+    let mut near = vec![false; quads.positions.len()];
+    flat.flat_map(|(_, q)| q).for_each(|&v| near[v as usize] = true);
     for _ in 0..RELEASED_RINGS {
-        let touching = quads.quads.iter().filter(|q| q.iter().any(|&v| near.get(v as usize) == Some(&true)));
+        let touching = quads.quads.iter().filter(|q| q.iter().any(|&v| near[v as usize]));
         let ring: Vec<u32> = touching.flatten().copied().collect();
         ring.into_iter().for_each(|v| near[v as usize] = true);
     }
     let mut any = false;
-    for v in (0..held.len()).filter(|&v| near[v]) {
-        if held[v] && !is_corner(quads.positions[v], quads.base_face[v], surface) {
-            (held[v], any) = (false, true);
+    for (v, held) in held.iter_mut().enumerate().filter(|(v, _)| near[*v]) {
+        if *held && !is_corner(v) {
+            (*held, any) = (false, true);
         }
     }
     any
@@ -143,5 +149,54 @@ fn carry(quads: &mut QuadMesh, proxy: &Proxy, original: &TriMesh) {
         let at = SurfacePoint { face: FaceId(*face), weights: nearest_in_triangle(*position, &corners) };
         let at = proxy.to_original(original, at);
         (*position, *face) = (at.position(original), at.face.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of unit squares, `n` by `n` vertices.
+    fn grid(n: u32) -> QuadMesh {
+        let place = |k: u32| DVec3::new(f64::from(k % n), f64::from(k / n), 0.0);
+        let quad = |k: u32| {
+            let v = k + k / (n - 1);
+            [v, v + 1, v + n + 1, v + n]
+        };
+        let count = (n * n) as usize;
+        let quads: Vec<[u32; 4]> = (0..(n - 1) * (n - 1)).map(quad).collect();
+        QuadMesh {
+            positions: (0..n * n).map(place).collect(),
+            patch: vec![0; quads.len()],
+            quads,
+            base_face: vec![0; count],
+            boundary: vec![false; count],
+            n_nodes: 1,
+            arcs: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn long_rows_on_features_are_held_and_short_ones_and_single_vertices_not() {
+        let mesh = grid(10);
+        let mut on = vec![false; 100];
+        (0..10).for_each(|k| on[30 + k] = true);
+        (0..4).for_each(|k| on[70 + k] = true);
+        on[95] = true;
+        let held = resolved(&on, &mesh.quads);
+        assert!((0..100).all(|v| held[v] == (30..40).contains(&v)));
+    }
+
+    #[test]
+    fn vertices_of_a_flat_quad_are_let_go_but_for_corners() {
+        let mut mesh = grid(10);
+        let mut held: Vec<bool> = (0..100).map(|v| v / 10 == 5).collect();
+        let before = held.clone();
+        assert!(!release(&mesh, |_| false, &mut held));
+        assert_eq!(held, before);
+        // One corner on the line between its neighbours.
+        mesh.positions[54] = 0.5 * (mesh.positions[44] + mesh.positions[55]);
+        assert!(release(&mesh, |v| v == 53, &mut held));
+        assert!(!held[54] && !held[52] && held[53] && held[50] && held[59]);
     }
 }

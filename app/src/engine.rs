@@ -386,6 +386,8 @@ pub struct EmbeddingSummary {
     pub planar: f64,
     /// Longer over shorter side of the most oblong patch, and its middle.
     pub aspect: (f64, DVec3),
+    /// Sharp edges on isolines, sharp edges in all, and the middle of the first that is not on one.
+    pub features: (usize, usize, Option<DVec3>),
     /// What could not be unfolded, in words.
     pub folds: Vec<Remark>,
     /// What the maps do to each triangle of the design mesh.

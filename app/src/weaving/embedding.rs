@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::embed::{
-    Embedded, EmbeddingError, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature, measure_patches,
+    Embedded, EmbeddingError, FeatureEdges, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature,
+    measure_patches,
 };
 use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::mesh::TriMesh;
@@ -228,6 +229,7 @@ fn finished(session: &Session, drawn: &Drawn, embedded: Embedded) -> Optimised {
         alignment: report.measures.alignment,
         planar: report.measures.planar,
         aspect: most_oblong(&embedded.maps, &patches),
+        features: features(&report.features),
         folds: folds(report.folds.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)))),
         triangles: distortion,
     };
@@ -249,6 +251,12 @@ fn most_oblong(maps: &[PatchMap], patches: &[PatchMeasures]) -> (f64, DVec3) {
     let from_middle = |v: usize| map.uv[v].distance_squared(0.5 * map.size);
     let middle = (0..map.uv.len()).min_by(|&a, &b| from_middle(a).total_cmp(&from_middle(b)));
     (aspect, middle.map_or(DVec3::ZERO, |v| map.mesh.positions()[v]))
+}
+
+/// Sharp edges on isolines, in all, and the middle of the first that is not on one.
+fn features(edges: &FeatureEdges) -> (usize, usize, Option<DVec3>) {
+    let middle = |ends: &[[f64; 3]; 2]| ends.iter().map(|&p| DVec3::from_array(p)).sum::<DVec3>() / 2.0;
+    (edges.on_isolines, edges.all, edges.off.first().map(middle))
 }
 
 /// One remark for each reason, with the first place.

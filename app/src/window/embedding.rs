@@ -1,6 +1,7 @@
 //! The panel of the optimised embedding, and the legend of its colours.
 
 use egui::{Align, Align2, Color32, Frame, Layout, Margin, Mesh, RichText, Stroke, Ui, pos2, vec2};
+use glam::DVec3;
 
 use super::action::Action;
 use super::panels::{remark_row, wide_button};
@@ -93,41 +94,67 @@ fn figures(s: &EmbeddingSummary, ui: &mut Ui, actions: &mut Vec<Action>) {
     card.show(ui, |ui| {
         ui.set_width(ui.available_width());
         egui::Grid::new("embedding").num_columns(2).spacing([10.0, 1.0]).show(ui, |ui| {
-            let mut row = |name: &str, value: String, hover: &str| {
-                ui.label(RichText::new(name).color(theme::QUIET)).on_hover_text(hover);
-                ui.label(value).on_hover_text(hover);
-                ui.end_row();
-            };
-            row("Steps", s.steps.to_string(), "Steps of the nodes");
+            row(ui, "Steps", s.steps.to_string(), "Steps of the nodes");
             let [before, after] = s.energy.map(significant);
             row(
+                ui,
                 "Energy",
                 format!("{before} to {after}"),
                 "What is minimised, over the surface's area, before and after",
             );
             let [before, after] = s.flipped;
-            row("Folds", format!("{before} to {after}"), "Triangles the map turns over, before and after");
+            row(ui, "Folds", format!("{before} to {after}"), "Triangles the map turns over, before and after");
             row(
+                ui,
                 "Conformal",
                 format!("{:.3}", s.conformal),
                 "E_confor, mean conformal distortion: 2 where angles are kept",
             );
-            row("Alignment", format!("{:.1}° off", s.alignment), "E°: mean angle to the nearest principal direction");
-            row("Planarity", significant(s.planar), "E_planar: 0 where quads along the isolines are flat");
+            row(
+                ui,
+                "Alignment",
+                format!("{:.1}° off", s.alignment),
+                "E°: mean angle to the nearest principal direction",
+            );
+            row(ui, "Planarity", significant(s.planar), "E_planar: 0 where quads along the isolines are flat");
+            let (on, all, off) = s.features;
+            if all > 0 {
+                let hover = "Sharp edges that lie on isolines exactly";
+                match off {
+                    None => row(ui, "Features", format!("all {all} edges on isolines"), hover),
+                    Some(place) => {
+                        ui.label(RichText::new("Features").color(theme::QUIET)).on_hover_text(hover);
+                        link(&format!("{} of {all} edges off isolines", all - on), place, ui, actions);
+                        ui.end_row();
+                    }
+                }
+            }
             ui.label(RichText::new("Aspect").color(theme::QUIET))
                 .on_hover_text("Of the most oblong patch: longer to shorter side");
             let (aspect, place) = s.aspect;
-            let text = RichText::new(format!("{aspect:.1} to 1 at worst")).color(theme::ACCENT);
-            let link = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
-            if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
-                actions.push(Action::LookAt(place));
-            }
+            link(&format!("{aspect:.1} to 1 at worst"), place, ui, actions);
         });
         let [r, g, b] = distortion::FOLDED;
         for fold in &s.folds {
             remark_row(fold, Color32::from_rgb(r, g, b), ui, actions);
         }
     });
+}
+
+/// A figure and its name.
+fn row(ui: &mut Ui, name: &str, value: String, hover: &str) {
+    ui.label(RichText::new(name).color(theme::QUIET)).on_hover_text(hover);
+    ui.label(value).on_hover_text(hover);
+    ui.end_row();
+}
+
+/// Words that lead to a place.
+fn link(text: &str, place: DVec3, ui: &mut Ui, actions: &mut Vec<Action>) {
+    let words = RichText::new(text).color(theme::ACCENT);
+    let link = ui.add(egui::Label::new(words).sense(egui::Sense::click()));
+    if link.on_hover_cursor(egui::CursorIcon::PointingHand).on_hover_text("Show where").clicked() {
+        actions.push(Action::LookAt(place));
+    }
 }
 
 /// What the surface's colours tell.

@@ -11,7 +11,7 @@ use glam::DVec3;
 use plait_core::mesh::TriMesh;
 use plait_core::progress::{Cancelled, Progress};
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
-use plait_core::weave::ElasticEnergy;
+use plait_core::weave::{ElasticEnergy, Improvement};
 use thiserror::Error;
 
 /// Why the engine did not do what it was asked.
@@ -152,6 +152,13 @@ pub trait Engine: Send {
     fn set_visible(&mut self, strip: StripId, visible: bool) -> Result<(), EngineError>;
     /// The strip that helps most now; not yet placed.
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
+    /// Tries other strips, with which the layout follows the shape better. Every change for the better is handed to `watch`
+    /// with a scene of it, which may break off: the best so far is then kept. One step of the history.
+    fn improve(
+        &mut self,
+        watch: &mut dyn FnMut(Arc<Scene>, Improvement) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<Improvement, EngineError>;
     /// Weaves from now on with so much detail; the strips stay where they are.
     fn set_detail(&mut self, detail: Detail, progress: &Progress) -> Result<(), EngineError>;
     /// Pins a part of the layout where it is, or lets it go; no change of the strips.

@@ -14,6 +14,7 @@ use plait_app::engine::{
 use plait_core::mesh::{TriMesh, builtin};
 use plait_core::progress::Progress;
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
+use plait_core::weave::{Fit, Improvement};
 
 /// Opens a rounded cube, whatever is asked for. With one strip it has a layout; every strip is the same.
 pub struct StandIn;
@@ -98,6 +99,29 @@ impl Engine for Session {
     fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
         Ok(Proposal { curve, energy: None, cost: 1.0, polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2] })
+    }
+    fn improve(
+        &mut self,
+        watch: &mut dyn FnMut(Arc<Scene>, Improvement) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<Improvement, EngineError> {
+        let fit = |patches| Fit { patches, alignment: 0.5 * patches as f64, ..Fit::default() };
+        let before = self.strips;
+        let mut improvement = Improvement { before: fit(20), after: fit(20), changes: 0 };
+        while improvement.changes < 9 {
+            if let Err(cancelled) = progress.check() {
+                self.strips = before;
+                return Err(cancelled.into());
+            }
+            improvement.changes += 1;
+            improvement.after = fit(20 - improvement.changes);
+            self.change(self.strips + 1);
+            if watch(self.scene(), improvement).is_break() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Ok(improvement)
     }
     fn set_detail(&mut self, _: Detail, _: &Progress) -> Result<(), EngineError> {
         Ok(())

@@ -64,6 +64,9 @@ pub struct WeaveArguments {
     /// With --suggest: until no region has this colour or a more urgent one.
     #[arg(long, value_enum, default_value_t = Until::Red, requires = "suggest")]
     pub until: Until,
+    /// Try other strips, with which the layout follows the shape better, in so many rounds at most.
+    #[arg(long, value_name = "ROUNDS", num_args = 0..=1)]
+    pub improve: Option<Option<usize>>,
     /// The folder to write into; made if it does not exist.
     #[arg(long)]
     pub out: PathBuf,

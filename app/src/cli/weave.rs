@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -9,12 +10,13 @@ use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, Ground, MeshSource, Options, QuadSize, Script, Session, Shortest, WeaveError, replay,
-    write_all,
+    Design, ExportOptions, Goal, Ground, Improvement, MeshSource, Options, QuadSize, ROUNDS, Script, Session, Shortest,
+    WeaveError, replay, write_all,
 };
 
 use super::embed::summary;
 use super::{DetailArguments, RefineArguments, SizeArguments, Until, WeaveArguments, has_extension};
+use crate::weaving::improved;
 
 /// Weaves and writes into the folder.
 ///
@@ -36,7 +38,14 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
         }
     }
     let woven = start.elapsed().as_secs_f64();
-    let seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
+    if let Some(rounds) = arguments.improve {
+        improve(&mut session, rounds.unwrap_or(ROUNDS), &progress)?;
+    }
+    let improved = start.elapsed().as_secs_f64();
+    let mut seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
+    if arguments.improve.is_some() {
+        seconds.insert("improve".to_owned(), improved - woven);
+    }
     let embedding = ExportOptions::default().embedding.filter(|_| !arguments.no_optimise);
     let options = export_options(arguments.size, arguments.refine, embedding)?;
     let mut watch = |_: &Snapshot| Next::Continue;
@@ -55,6 +64,14 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     if let Some(Err(problem)) = export.optimised {
         say(&format!("plait: the rough drawing was written, since the optimisation failed: {problem}"));
     }
+    Ok(())
+}
+
+/// Tries other strips, and says what came of it.
+fn improve(session: &mut Session, rounds: usize, progress: &Progress) -> anyhow::Result<()> {
+    let mut watch = |_: &Session, _: &Improvement| ControlFlow::Continue(());
+    let improvement = session.improve(rounds, progress, &mut watch).map_err(|error| explain(session, error))?;
+    say(&format!("plait: {}", improved(&improvement)));
     Ok(())
 }
 

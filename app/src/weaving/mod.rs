@@ -6,6 +6,8 @@ mod snapshot;
 mod stripes;
 mod words;
 
+pub use words::improved;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -16,7 +18,9 @@ use plait_core::layout::LayoutError;
 use plait_core::mesh::builtin_names;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
-use plait_core::weave::{self, Design, Goal, Ground, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven};
+use plait_core::weave::{
+    self, Design, Goal, Ground, Improvement, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven,
+};
 
 use crate::engine::{
     BuiltIn, Detail, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview,
@@ -214,6 +218,17 @@ impl Engine for SessionEngine {
         let goal = if self.session.woven().count(Colour::Red) > 0 { Goal::Valid } else { Goal::Separated };
         let found = self.session.suggest(goal, progress).map_err(|e| failed(e, Some(&self.session)))?;
         Ok(proposal(self.session.model(), found))
+    }
+
+    fn improve(
+        &mut self,
+        watch: &mut dyn FnMut(Arc<Scene>, Improvement) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<Improvement, EngineError> {
+        let Self { session, model, .. } = self;
+        let mut show = |s: &Session, i: &Improvement| watch(Arc::new(model.scene(s, &Later::default())), *i);
+        let done = session.improve(weave::ROUNDS, progress, &mut show);
+        self.changed(done)
     }
 
     fn scene(&self) -> Arc<Scene> {

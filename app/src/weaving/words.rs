@@ -2,7 +2,7 @@
 
 use plait_core::dual::{Colour, Finding, RegionReport};
 use plait_core::layout::QuadLayout;
-use plait_core::weave::Session;
+use plait_core::weave::{Improvement, Session};
 
 use super::region_place;
 use crate::engine::{RegionColor, Remark};
@@ -15,6 +15,21 @@ pub fn color(colour: Colour) -> RegionColor {
         Colour::Orange => RegionColor::Orange,
         Colour::Red => RegionColor::Red,
     }
+}
+
+/// What came of trying other strips.
+pub fn improved(i: &Improvement) -> String {
+    if i.changes == 0 {
+        return "no strips were found with which the layout follows the shape better".into();
+    }
+    let patches = |n: usize| format!("{n} {}", if n == 1 { "patch" } else { "patches" });
+    format!(
+        "the layout follows the shape within {:.1}° in {}, before within {:.1}° in {}",
+        i.after.alignment,
+        patches(i.after.patches),
+        i.before.alignment,
+        patches(i.before.patches),
+    )
 }
 
 /// One remark for each kind of thing that is the matter, most urgent first, then most frequent.

@@ -24,6 +24,8 @@ pub enum Action {
     Redo,
     /// Place the strip that helps most.
     Suggest,
+    /// Try other strips, with which the layout follows the shape better.
+    Improve,
     /// Select a strip, or none.
     Select(Option<StripId>),
     /// Remove a strip.
@@ -36,7 +38,7 @@ pub enum Action {
     ApplyDetail,
     /// Optimise the embedding of the layout.
     Optimise,
-    /// Stop the optimisation and keep the best so far.
+    /// Stop what is made better step by step, and keep the best so far.
     Stop,
     /// Pin a part of the layout, or let it go.
     SetPinned(LayoutPart, bool),

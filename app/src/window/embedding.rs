@@ -5,15 +5,19 @@ use glam::DVec3;
 
 use super::action::Action;
 use super::panels::{remark_row, wide_button};
-use super::{PlaitApp, theme};
+use super::{PlaitApp, bettering, theme};
 use crate::distortion::{self, Colours};
 use crate::engine::{EmbeddingSummary, LayoutPart, LayoutPreview, Scene};
-use crate::worker::Running;
+use crate::worker::Betters;
 
 /// The button, or the progress of the work; then what was achieved.
 pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
-    if let Some(running) = app.optimisation() {
-        in_progress(app, &running, ui, actions);
+    if let Some(running) = app.bettering(Betters::Embedding) {
+        let so_far = app.step.as_ref().map(|s| {
+            let folds = if s.flipped == 1 { "fold" } else { "folds" };
+            format!("Step {} · energy {:.0} % · {} {folds}", s.step, 100.0 * s.energy, s.flipped)
+        });
+        bettering::in_progress(&running, so_far, ui, actions);
         return;
     }
     let again = scene.embedding.is_some();
@@ -23,7 +27,7 @@ pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action
     } else {
         "Moves nodes and arcs, once the layout is valid"
     };
-    if wide_button(ui, text, false, scene.exportable, hint) {
+    if wide_button(ui, text, false, app.can_better(), hint) {
         actions.push(Action::Optimise);
     }
     pins(app.layout(), ui, actions);
@@ -31,30 +35,6 @@ pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action
         figures(summary, ui, actions);
         colours(app, ui, actions);
     }
-}
-
-fn in_progress(app: &PlaitApp, running: &Running, ui: &mut Ui, actions: &mut Vec<Action>) {
-    let (stage, fraction) = running.progress.state();
-    let stopping = running.stop.as_ref().is_some_and(|s| s.load(std::sync::atomic::Ordering::Relaxed));
-    let stage = if stopping { "Finishing the best so far" } else { stage.as_str() };
-    ui.label(if stage.is_empty() { "Optimising" } else { stage });
-    ui.add(egui::ProgressBar::new(fraction as f32).desired_height(6.0).fill(theme::ACCENT));
-    let text = app.step.as_ref().map_or_else(String::new, |s| {
-        let folds = if s.flipped == 1 { "fold" } else { "folds" };
-        format!("Step {} · energy {:.0} % · {} {folds}", s.step, 100.0 * s.energy, s.flipped)
-    });
-    ui.label(RichText::new(text).color(theme::QUIET));
-    ui.horizontal(|ui| {
-        let stop = egui::Button::new("Stop").min_size(vec2(0.5 * (ui.available_width() - 8.0), 32.0));
-        let can_stop = app.step.is_some() && !stopping;
-        if ui.add_enabled(can_stop, stop).on_hover_text("Keeps the best embedding so far (M)").clicked() {
-            actions.push(Action::Stop);
-        }
-        let cancel = egui::Button::new("Cancel").min_size(vec2(ui.available_width(), 32.0));
-        if ui.add(cancel).on_hover_text("Drops what was done (Escape)").clicked() {
-            actions.push(Action::Cancel);
-        }
-    });
 }
 
 /// How many parts are pinned.

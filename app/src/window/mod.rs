@@ -1,6 +1,7 @@
 //! The window: state, what each action does, and the layout of panels around the 3D view.
 
 mod action;
+mod bettering;
 mod detail;
 mod dialogs;
 mod embedding;
@@ -16,6 +17,7 @@ use std::time::Duration;
 
 use glam::{DVec3, Vec2, Vec3};
 use plait_core::surface::SurfacePoint;
+use plait_core::weave::Improvement;
 
 pub use action::{Action, ViewOption, ViewOptions};
 use dialogs::{Asked, Dialogs};
@@ -31,7 +33,8 @@ use crate::engine::{
 use crate::input::Input;
 use crate::render::Renderer;
 use crate::shading;
-use crate::worker::{Job, Reply, Running, Worker};
+use crate::weaving::improved;
+use crate::worker::{Betters, Job, Reply, Running, Worker};
 
 /// Work that takes longer shows a progress bar.
 const SHORT: Duration = Duration::from_millis(500);
@@ -68,6 +71,8 @@ pub struct PlaitApp {
     colours: Colours,
     /// The embedding being optimised, as it was last heard of.
     step: Option<EmbeddingStep>,
+    /// How much better the strips being tried are, as it was last heard of.
+    improvement: Option<Improvement>,
     selected: Option<StripId>,
     /// The detail chosen last, which need not be applied yet.
     detail: Option<Detail>,
@@ -115,6 +120,7 @@ impl PlaitApp {
             options: ViewOptions::default(),
             colours: Colours::default(),
             step: None,
+            improvement: None,
             selected: None,
             detail: None,
             messages: Messages::default(),
@@ -165,9 +171,14 @@ impl PlaitApp {
         self.scene.as_ref().filter(|_| self.step.is_none()).and_then(|s| s.embedding.as_ref())
     }
 
-    /// The optimisation that is on its way.
-    fn optimisation(&self) -> Option<Running> {
-        self.worker.running().filter(|r| r.stop.is_some())
+    /// The work on its way that makes this better step by step.
+    fn bettering(&self, what: Betters) -> Option<Running> {
+        self.worker.running().filter(|r| r.steps.as_ref().is_some_and(|s| s.of == what))
+    }
+
+    /// Whether anything is being made better step by step.
+    fn is_bettering(&self) -> bool {
+        self.worker.running().is_some_and(|r| r.steps.is_some())
     }
 
     /// The camera.
@@ -206,8 +217,8 @@ impl PlaitApp {
 
     /// The work that has been going on long enough to be shown.
     fn long_work(&self) -> Option<Running> {
-        // An optimisation has its place in the panel.
-        self.worker.running().filter(|r| !r.yields && r.stop.is_none() && r.since.elapsed() >= SHORT)
+        // What becomes better step by step has its place in the panel.
+        self.worker.running().filter(|r| !r.yields && r.steps.is_none() && r.since.elapsed() >= SHORT)
     }
 
     fn take_replies(&mut self) {
@@ -216,6 +227,7 @@ impl PlaitApp {
                 Reply::Opened { source, scene } => self.opened(&source, scene),
                 Reply::Changed(scene) => self.changed(scene),
                 Reply::Completed(scene) => self.scene = Some(scene),
+                Reply::Refitted { scene, improvement, complete } => self.refitted(scene, improvement, complete),
                 Reply::Improved(step) => self.step = Some(step),
                 Reply::Optimised(scene) => {
                     self.step = None;
@@ -234,7 +246,7 @@ impl PlaitApp {
                 }
                 Reply::Failed { label, error } => {
                     // Whatever was on its way did not come to an end.
-                    self.step = None;
+                    (self.step, self.improvement) = (None, None);
                     self.failed(&label, error);
                 }
             }
@@ -279,6 +291,18 @@ impl PlaitApp {
         self.scene = Some(scene);
     }
 
+    /// Takes in strips that make a better layout.
+    fn refitted(&mut self, scene: Arc<Scene>, improvement: Improvement, complete: bool) {
+        self.improvement = Some(improvement).filter(|_| !complete);
+        if improvement.changes > 0 {
+            self.changed(scene);
+        }
+        if complete {
+            let text = format!("Improved: {}", improved(&improvement));
+            self.messages.add(Tone::Done, text, None);
+        }
+    }
+
     /// Carries out a wish.
     pub fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
@@ -288,7 +312,7 @@ impl PlaitApp {
             Action::AskExport => self.ask_export(ctx),
             Action::Quads(quads) => self.quads = quads,
             // What is on its way is taken back first.
-            Action::Undo if self.optimisation().is_some() => self.worker.cancel(),
+            Action::Undo if self.is_bettering() => self.worker.cancel(),
             Action::Undo => self.change(Job::Undo),
             Action::Redo => self.change(Job::Redo),
             Action::Suggest => self.change(Job::Suggest),
@@ -301,6 +325,7 @@ impl PlaitApp {
                     self.change(Job::SetDetail(detail));
                 }
             }
+            Action::Improve => self.improve(),
             Action::Optimise => self.optimise(),
             Action::Stop => self.worker.stop(),
             Action::SetPinned(part, pinned) => self.worker.request(Job::SetPinned(part, pinned)),
@@ -330,8 +355,20 @@ impl PlaitApp {
         }
     }
 
+    /// Whether there is a layout to be made better, and nobody at it.
+    fn can_better(&self) -> bool {
+        self.scene.as_ref().is_some_and(|s| s.exportable) && !self.is_bettering()
+    }
+
+    fn improve(&mut self) {
+        if self.can_better() {
+            self.improvement = None;
+            self.change(Job::Improve);
+        }
+    }
+
     fn optimise(&mut self) {
-        if self.scene.as_ref().is_some_and(|s| s.exportable) && self.optimisation().is_none() {
+        if self.can_better() {
             self.hover.clear();
             self.worker.request(Job::Optimise);
         }

@@ -7,7 +7,7 @@ use egui::{
 use super::action::{Action, ViewOption};
 use super::icons::{self, Icon};
 use super::messages::{Message, Tone};
-use super::{PlaitApp, detail, embedding, theme};
+use super::{PlaitApp, bettering, detail, embedding, theme};
 use crate::engine::{LayoutPart, Proposal, Remark, Scene, Source, Strip};
 use crate::shading::{self, region_rgb};
 
@@ -29,6 +29,7 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
             ("Click", "place the strip shown"),
             ("S", "place the strip that helps most"),
             ("Click on a node or an arc", "pin it where it is, or let it go"),
+            ("I", "try other strips, for a better layout"),
             ("M", "optimise the embedding; again: stop, keep the best"),
             ("Delete", "remove the selected strip"),
             ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
@@ -92,8 +93,11 @@ pub fn keys(app: &PlaitApp, ctx: &egui::Context) -> Vec<Action> {
         if i.consume_key(Modifiers::NONE, Key::S) {
             actions.push(Action::Suggest);
         }
+        if i.consume_key(Modifiers::NONE, Key::I) {
+            actions.push(Action::Improve);
+        }
         if i.consume_key(Modifiers::NONE, Key::M) {
-            actions.push(if app.optimisation().is_some() { Action::Stop } else { Action::Optimise });
+            actions.push(if app.is_bettering() { Action::Stop } else { Action::Optimise });
         }
         if i.consume_key(Modifiers::NONE, Key::F) {
             actions.push(Action::FrameAll);
@@ -168,7 +172,8 @@ fn menus(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
         let remove = app.selected.map(Action::Remove);
         item(ui, actions, "Remove strip", "Delete", remove.is_some(), remove.unwrap_or(Action::Select(None)));
         item(ui, actions, "Suggest a strip", "S", scene.is_some(), Action::Suggest);
-        let valid = scene.is_some_and(|s| s.exportable) && app.optimisation().is_none();
+        let valid = app.can_better();
+        item(ui, actions, "Improve the layout", "I", valid, Action::Improve);
         item(ui, actions, "Optimise the embedding", "M", valid, Action::Optimise);
     });
     ui.menu_button("View", |ui| view_menu(app, ui, actions));
@@ -258,6 +263,7 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
     if wide_button(ui, "Suggest a strip", !scene.exportable, useful, "Places the strip that helps most now (S)") {
         actions.push(Action::Suggest);
     }
+    bettering::strips(app, scene, ui, actions);
     section(ui, "Embedding");
     embedding::show(app, scene, ui, actions);
     if scene.exportable {
@@ -398,7 +404,7 @@ fn status(app: &PlaitApp, ui: &mut Ui) {
     let pinned = |part| app.layout().and_then(|l| l.is_pinned(part)) == Some(true);
     let hint = if app.scene.is_none() {
         "Drop a mesh on the window, or open one with Ctrl+O"
-    } else if app.optimisation().is_some() {
+    } else if app.is_bettering() {
         "Stop keeps the best embedding so far · Escape drops it · Drag: orbit"
     } else if app.input.is_dragging() {
         "Left or middle drag: orbit · Right drag: pan"

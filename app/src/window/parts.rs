@@ -16,7 +16,7 @@ const SLACK: f32 = 0.01;
 /// shown and seen. None while the layout moves.
 pub fn under(app: &PlaitApp, at: Vec2) -> Option<LayoutPart> {
     let layout = app.layout().filter(|_| app.options.layout && app.step.is_none())?;
-    if app.optimisation().is_some() {
+    if app.is_bettering() {
         return None;
     }
     nearest_node(app, layout, at).or_else(|| nearest_arc(app, layout, at))

@@ -148,7 +148,7 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
     } else if response.contains_pointer() && app.hover.part.is_some() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    } else if response.contains_pointer() && app.hover.point.is_some() && app.optimisation().is_none() {
+    } else if response.contains_pointer() && app.hover.point.is_some() && !app.is_bettering() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
     }
     paint(app, ui, rect);
@@ -242,7 +242,7 @@ fn hover(app: &mut PlaitApp, at: Vec2) {
     }
     app.hover.calm_at = None;
     // Over an arc a click would not place; during an optimisation it would drop that.
-    if app.hover.part.is_some() || app.optimisation().is_some() {
+    if app.hover.part.is_some() || app.is_bettering() {
         app.hover.clear();
         app.worker.forget_hover();
         return;
@@ -270,7 +270,7 @@ fn pin(app: &mut PlaitApp) {
 }
 
 fn place(app: &mut PlaitApp, at: Vec2) {
-    if app.optimisation().is_some() {
+    if app.is_bettering() {
         return;
     }
     let calm_here = app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM);

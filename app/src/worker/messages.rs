@@ -1,11 +1,13 @@
 //! What goes to the worker and what comes back.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use plait_core::progress::Progress;
+use plait_core::weave::Improvement;
 
 use crate::engine::{
     Detail, EmbeddingStep, EngineError, ExportOptions, ExportReport, LayoutPart, Proposal, Scene, Source, StripId,
@@ -28,6 +30,8 @@ pub enum Job {
     Redo,
     /// Find the strip that helps most and place it.
     Suggest,
+    /// Try other strips.
+    Improve,
     /// Weave with so much detail.
     SetDetail(Detail),
     /// Pin a part of the layout, or let it go.
@@ -51,11 +55,21 @@ impl Job {
             Self::Undo => "Undoing".into(),
             Self::Redo => "Redoing".into(),
             Self::Suggest => "Looking for the strip that helps most".into(),
+            Self::Improve => "Improving the layout".into(),
             Self::SetDetail(_) => "Setting the detail".into(),
             Self::SetPinned(..) => "Pinning".into(),
             Self::Optimise => "Optimising the embedding".into(),
             Self::Save(_) => "Saving the design".into(),
             Self::Export(..) => "Exporting the layout".into(),
+        }
+    }
+
+    /// What it makes better step by step, if it does.
+    pub(super) fn betters(&self) -> Option<Betters> {
+        match self {
+            Self::Improve => Some(Betters::Strips),
+            Self::Optimise => Some(Betters::Embedding),
+            _ => None,
         }
     }
 
@@ -69,6 +83,7 @@ impl Job {
                 | Self::Undo
                 | Self::Redo
                 | Self::Suggest
+                | Self::Improve
                 | Self::SetDetail(_)
         )
     }
@@ -97,6 +112,15 @@ pub enum Reply {
         /// Whether this is all.
         complete: bool,
     },
+    /// Other strips make a better layout.
+    Refitted {
+        /// The snapshot of them.
+        scene: Arc<Scene>,
+        /// How much better.
+        improvement: Improvement,
+        /// Whether this is the end of it.
+        complete: bool,
+    },
     /// The embedding became better; more may follow.
     Improved(EmbeddingStep),
     /// The embedding was optimised.
@@ -114,6 +138,31 @@ pub enum Reply {
     },
 }
 
+/// What is made better step by step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Betters {
+    /// The strips.
+    Strips,
+    /// The embedding of their layout.
+    Embedding,
+}
+
+/// Work that makes something better step by step and can be stopped.
+#[derive(Debug, Clone)]
+pub struct Steps {
+    /// What it makes better.
+    pub of: Betters,
+    /// To be set in order to stop it and keep the best so far.
+    pub stop: Arc<AtomicBool>,
+}
+
+impl Steps {
+    /// Whether it has been asked to stop.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
 /// What the worker is busy with.
 #[derive(Debug, Clone)]
 pub struct Running {
@@ -125,6 +174,14 @@ pub struct Running {
     pub progress: Arc<Progress>,
     /// Whether anything else goes before it: a hover request, or what was left for later.
     pub yields: bool,
-    /// Of an optimisation: to be set in order to stop it and keep the best so far.
-    pub stop: Option<Arc<AtomicBool>>,
+    /// Of what makes something better step by step.
+    pub steps: Option<Steps>,
+}
+
+impl Running {
+    /// Whether the work goes on after a step.
+    pub(super) fn flow(&self) -> ControlFlow<()> {
+        let stopped = self.steps.as_ref().is_some_and(Steps::is_stopped);
+        if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
 }

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use plait_core::surface::SurfacePoint;
 
-pub use messages::{Job, Reply, Running};
+pub use messages::{Betters, Job, Reply, Running, Steps};
 use task::Loop;
 
 use crate::engine::Opener;
@@ -79,7 +79,7 @@ impl Worker {
         if open {
             state.jobs.clear();
         }
-        let useless = |r: &&Running| r.yields || open || (r.stop.is_some() && job.changes_strips());
+        let useless = |r: &&Running| r.yields || open || (r.steps.is_some() && job.changes_strips());
         if let Some(running) = state.running.as_ref().filter(useless) {
             running.progress.cancel();
         }
@@ -114,10 +114,10 @@ impl Worker {
         }
     }
 
-    /// Stops an optimisation: the best so far is finished and kept.
+    /// Stops what makes something better step by step: the best so far is finished and kept.
     pub fn stop(&self) {
-        if let Some(stop) = self.shared.lock().running.as_ref().and_then(|r| r.stop.as_ref()) {
-            stop.store(true, Ordering::Relaxed);
+        if let Some(steps) = self.shared.lock().running.as_ref().and_then(|r| r.steps.as_ref()) {
+            steps.stop.store(true, Ordering::Relaxed);
         }
     }
 

@@ -1,8 +1,6 @@
 //! The worker's end: the loop that does one task after the other on the engine.
 
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
@@ -11,7 +9,7 @@ use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
 
 use super::Shared;
-use super::messages::{Job, Reply, Running};
+use super::messages::{Job, Reply, Running, Steps};
 use crate::engine::{Engine, EngineError, Opener, Source};
 
 enum Task {
@@ -76,12 +74,13 @@ impl Loop {
             };
             let task = task.or_else(|| std::mem::take(&mut state.incomplete).then_some(Task::Complete));
             if let Some(task) = task {
+                let betters = if let Task::Job(job) = &task { job.betters() } else { None };
                 let running = Running {
                     label: task.label(),
                     since: Instant::now(),
                     progress: Arc::default(),
                     yields: !matches!(task, Task::Job(_)),
-                    stop: matches!(task, Task::Job(Job::Optimise)).then(Arc::default),
+                    steps: betters.map(|of| Steps { of, stop: Arc::default() }),
                 };
                 state.running = Some(running.clone());
                 drop(state);
@@ -127,14 +126,27 @@ impl Loop {
                 let proposal = engine.suggest(progress)?;
                 engine.place(&proposal, progress)?;
             }
+            Job::Improve => {
+                let mut watch = |scene, improvement| {
+                    drop(self.sender.send(Reply::Refitted { scene, improvement, complete: false }));
+                    (self.notify)();
+                    running.flow()
+                };
+                let done = engine.improve(&mut watch, progress);
+                // What was shown on the way is not what there is.
+                if done.is_err() {
+                    drop(self.sender.send(Reply::Changed(engine.scene())));
+                }
+                let improvement = done?;
+                return Ok(Some(Reply::Refitted { scene: engine.scene(), improvement, complete: true }));
+            }
             Job::SetDetail(detail) => engine.set_detail(detail, progress)?,
             Job::SetPinned(part, pinned) => engine.set_pinned(part, pinned)?,
             Job::Optimise => {
-                let stopped = || running.stop.as_ref().is_some_and(|s| s.load(Ordering::Relaxed));
                 let mut watch = |step| {
                     drop(self.sender.send(Reply::Improved(step)));
                     (self.notify)();
-                    if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    running.flow()
                 };
                 engine.optimise(&mut watch, progress)?;
                 return Ok(Some(Reply::Optimised(engine.scene())));

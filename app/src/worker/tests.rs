@@ -7,6 +7,7 @@ use glam::DVec3;
 use plait_core::mesh::{FaceId, TriMesh};
 use plait_core::progress::Progress;
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
+use plait_core::weave::Improvement;
 
 use super::*;
 use crate::engine::{
@@ -84,6 +85,21 @@ impl Engine for Fake {
     }
     fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
         Err(EngineError::failed("nothing helps"))
+    }
+    fn improve(
+        &mut self,
+        watch: &mut dyn FnMut(Arc<Scene>, Improvement) -> ControlFlow<()>,
+        progress: &Progress,
+    ) -> Result<Improvement, EngineError> {
+        for changes in 1.. {
+            progress.check()?;
+            let improvement = Improvement { changes, ..Improvement::default() };
+            if watch(self.scene(), improvement).is_break() {
+                return Ok(improvement);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Err(EngineError::failed("never"))
     }
     fn set_detail(&mut self, _: Detail, _: &Progress) -> Result<(), EngineError> {
         Ok(())

@@ -87,9 +87,15 @@ impl<'a> Optimizer<'a> {
     ///
     /// See [`EmbeddingError`].
     pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
+        let ready = Self::net(job)?;
+        progress.check()?;
+        Self::on(job, ready, (Aim::LeastSquares, Features::Held), progress)?.map_err(|_| EmbeddingError::Folded)
+    }
+
+    /// The net of a drawn layout with what is known of its mesh: sharp edges, and curvature at the vertices.
+    pub(super) fn net(job: &Job<'_>) -> Result<(Net, Vec<bool>, Vec<PrincipalCurvature>), EmbeddingError> {
         let Job { surface, layout, .. } = *job;
         let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
-        progress.check()?;
         let sharp = sharp_edges(&surface, &net);
         let held = pinned(job);
         snap(&mut net, &sharp, |i| held[i]);
@@ -101,8 +107,7 @@ impl<'a> Optimizer<'a> {
             surface.curvature[at.nearest_vertex(surface.mesh).index()]
         };
         let curvature: Vec<PrincipalCurvature> = (0..net.mesh.n_vertices()).map(nearest).collect();
-        Self::on(job, (net, sharp, curvature), (Aim::LeastSquares, Features::Held), progress)?
-            .map_err(|_| EmbeddingError::Folded)
+        Ok((net, sharp, curvature))
     }
 
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.

@@ -145,7 +145,7 @@ fn corners_on_design(model: &Model) -> Vec<(VertexId, i8)> {
 
 /// Where the node of each region is to lie: at its only pronounced corner, or where there is none, at that corner of its
 /// features which is `curved` most in the sense of the node.
-fn preferred_nodes(
+pub(super) fn preferred_nodes(
     arrangement: &Arrangement,
     layout: &QuadLayout,
     reports: &[RegionReport],

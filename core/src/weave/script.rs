@@ -3,6 +3,7 @@
 //! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`.
 //! Points are in the file's coordinates and snap to the nearest point of the surface.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -28,6 +29,8 @@ pub enum Step {
     Place(bool),
     /// Press "Suggest" and place what is suggested; does nothing when nothing is left to do. `false` does nothing.
     Suggest(bool),
+    /// Press "Improve": other strips are tried, in so many rounds at most.
+    Improve(usize),
     /// Remove the strip placed as the `n`-th of those present, from 0.
     Delete(usize),
     /// Take the last change back. `false` does nothing.
@@ -183,6 +186,10 @@ impl Shown {
                     Err(WeaveError::Stuck(Stuck::Done)) => {}
                     Err(error) => return Err(error.into()),
                 }
+                *self = Self::default();
+            }
+            Step::Improve(rounds) => {
+                session.improve(rounds, progress, &mut |_, _| ControlFlow::Continue(()))?;
                 *self = Self::default();
             }
             Step::Delete(n) => {

@@ -94,7 +94,7 @@ pub enum WeaveError {
 
 /// A state of the history: strips, and the pins that were set while they were there.
 #[derive(Debug, Clone)]
-struct Step {
+pub(super) struct Step {
     strips: Vec<Strip>,
     pins: Vec<Pin>,
 }
@@ -248,7 +248,7 @@ impl Session {
     ///
     /// When its curve does not lie on the mesh, or cancelled; the design is then as before.
     pub fn place(&mut self, proposal: Proposal, progress: &Progress) -> Result<StripId, WeaveError> {
-        let id = StripId(self.next_id);
+        let id = self.free_id();
         let mut strips = self.design.strips.clone();
         let curve = self.model.to_design(&proposal.curve)?;
         let on_proxy = self.model.proxy.is_some().then_some(proposal.curve);
@@ -326,9 +326,37 @@ impl Session {
 
     fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
         let now = self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
-        self.undo.push(now);
-        self.redo.clear();
+        self.remember(now);
         Ok(())
+    }
+
+    /// Makes a state that has been left the last one of the history.
+    pub(super) fn remember(&mut self, before: Step) {
+        self.undo.push(before);
+        self.redo.clear();
+    }
+
+    /// The present state.
+    pub(super) fn step(&self) -> Step {
+        Step { strips: self.design.strips.clone(), pins: self.design.pins.clone() }
+    }
+
+    /// Weaves other strips; what was before is for the caller to remember.
+    pub(super) fn weave(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
+        let newest = strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
+        self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
+        self.next_id = self.next_id.max(newest);
+        Ok(())
+    }
+
+    /// Goes back to a state that was woven before.
+    pub(super) fn restore(&mut self, step: Step, woven: Arc<Woven>) {
+        (self.design.strips, self.design.pins, self.woven) = (step.strips, step.pins, woven);
+    }
+
+    /// The number that the next strip gets.
+    pub(super) fn free_id(&self) -> StripId {
+        StripId(self.next_id)
     }
 
     /// Weaves another state in place of the present one, which is returned.

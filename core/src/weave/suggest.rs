@@ -9,11 +9,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::candidates::{Query, around, loops};
 use super::detour::detours;
 use super::proposal::Proposal;
 use super::session::{Session, WeaveError};
 use crate::dual::{Colour, Finding, RegionReport, assess};
-use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
+use crate::elastica::DirectionMask;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::surface::{RelaxOptions, SurfaceCurve, relax};
@@ -47,8 +48,6 @@ pub enum Stuck {
 const POINTS: usize = 10;
 /// Candidates tried in the arrangement, the cheapest first.
 const TRIED: usize = 32;
-/// Search states settled per point, at most: bounds the time on large meshes.
-const BUDGET: u64 = 120_000;
 /// Classes of curves tried per region when no elastica loop helps.
 const DETOURS: usize = 200;
 /// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edges: it is jagged.
@@ -151,48 +150,14 @@ impl Session {
         mask: &DirectionMask,
         progress: &Progress,
     ) -> Result<Vec<Proposal>, WeaveError> {
-        let graph = &self.model().graph;
-        let queries: Vec<(VertexId, Option<DVec3>)> = spread_points(self, region)
-            .into_iter()
+        let points = spread_points(self, region).into_iter();
+        let queries: Vec<Query> = points
             .flat_map(|v| match search {
                 Search::Cheapest => vec![(v, None)],
-                Search::Around => self.directions(v).map(|d| (v, Some(d))).to_vec(),
+                Search::Around => around(self.model(), v).to_vec(),
             })
             .collect();
-        graph.prepare(progress)?;
-        let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
-        let found: Vec<Vec<Proposal>> = queries
-            .par_chunks(share)
-            .map(|queries| {
-                let mut work = SearchWorkspace::new();
-                let mut list = Vec::new();
-                for &(vertex, direction) in queries {
-                    let query =
-                        ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
-                    let found = graph.proposals(&query, &mut work, progress)?;
-                    list.extend(found.loops.iter().map(Proposal::found));
-                }
-                Ok(list)
-            })
-            .collect::<Result<_, WeaveError>>()?;
-        tracing::debug!(?search, region, queries = queries.len(), "searched");
-        let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
-        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        // The same loop is found from many of its points.
-        all.dedup_by(|b, a| {
-            (b.cost - a.cost).abs() < 1e-6 * a.cost && a.curve.crossings.len() == b.curve.crossings.len()
-        });
-        all.truncate(TRIED);
-        Ok(all)
-    }
-
-    /// Four tangent directions at a vertex, all around.
-    fn directions(&self, v: VertexId) -> [DVec3; 4] {
-        let mesh = &self.model().mesh;
-        let normal: DVec3 = mesh.outgoing(v).map(|h| mesh.face_area_vector(mesh.face(h))).sum();
-        let n = normal.normalize_or(DVec3::Z);
-        let (x, y) = n.any_orthonormal_pair();
-        [x, x + y, y, y - x]
+        loops(self.model(), &queries, mask, TRIED, progress)
     }
 
     /// The candidate of least cost per step of progress, if any makes progress.

@@ -1,0 +1,68 @@
+//! How well the layout of some strips fits the shape, told before it is embedded.
+
+use serde::Serialize;
+
+use super::embedding::preferred_nodes;
+use super::ground::Ground;
+use super::model::Model;
+use super::session::WeaveError;
+use crate::dual::{Arrangement, Colour, assess};
+use crate::embed::{Job, Settings, foresee, headings};
+use crate::layout::{QuadLayout, embed};
+use crate::progress::Progress;
+use crate::surface::SurfaceCurve;
+
+/// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
+/// half a degree.
+const PATCH: f64 = 0.005;
+/// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
+const QUARTER: f64 = 0.01;
+/// What a node is worth that cannot be embedded well: of two patches or of more than six.
+const EXTREME: f64 = 0.5;
+const USUAL: std::ops::RangeInclusive<i32> = -2..=1;
+
+/// How well a layout fits the shape.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Fit {
+    /// The mean deviation from principal directions that is foreseen, in degrees.
+    pub alignment: f64,
+    /// Number of patches.
+    pub patches: usize,
+    /// Number of irregular nodes.
+    pub irregular: usize,
+    /// The deviation and what the structure is worth, together: the less, the better.
+    pub price: f64,
+}
+
+/// The fit of the layout that curves on the woven mesh of a model make, and what every triangle adds to its deviation.
+///
+/// # Errors
+///
+/// [`crate::layout::LayoutError::RedRegions`] if they make no layout; what drawing and field have to say.
+pub(super) fn fit(model: &Model, curves: &[&SurfaceCurve], progress: &Progress) -> Result<(Fit, Vec<f64>), WeaveError> {
+    let mesh = &model.mesh;
+    let arrangement = Arrangement::new(mesh, curves.iter().copied())?;
+    let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
+    let red: Vec<u32> = (0..reports.len() as u32).filter(|&r| reports[r as usize].colour == Colour::Red).collect();
+    let layout = QuadLayout::dual(&arrangement, &red, mesh.euler_characteristic())?;
+    let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &model.sharp, &model.vertex_curvatures);
+    let drawing = embed(&arrangement, &layout, &preferred, progress)?;
+    let ground = if model.proxy.is_some() { Ground::Proxy } else { Ground::Design };
+    let job = Job {
+        surface: model.surface(ground),
+        layout: &layout,
+        drawing: &drawing,
+        headings: &headings(&layout),
+        pinned_nodes: &[],
+        pinned_arcs: &[],
+        settings: Settings::default(),
+    };
+    let foreseen = foresee(&job, progress)?;
+    let index = |n: &crate::layout::Node| (if n.boundary { 2 } else { 4 }) - n.valence as i32;
+    let quarters: i32 = layout.nodes.iter().map(|n| index(n).abs()).sum();
+    let extreme = layout.nodes.iter().filter(|n| !USUAL.contains(&index(n))).count();
+    let patches = layout.patches.len();
+    let price = foreseen.alignment + PATCH * patches as f64 + QUARTER * f64::from(quarters) + EXTREME * extreme as f64;
+    let fit = Fit { alignment: foreseen.alignment, patches, irregular: layout.n_irregular(), price };
+    Ok((fit, foreseen.shares))
+}

@@ -69,3 +69,16 @@ pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCur
     }
     SurfaceCurve { crossings, closed }
 }
+
+/// The closed curve along the diagonals of a closed [`grid`] of `n` × `n` cells, between these.
+pub(crate) fn diagonal(n: u32) -> SurfaceCurve {
+    let beside = |i: u32| {
+        let cell = 2 * (i * n + i);
+        let next = 2 * (i * n + (i + 1) % n);
+        [
+            Crossing { halfedge: HalfedgeId(3 * cell + 1), t: 0.5 },
+            Crossing { halfedge: HalfedgeId(3 * next + 4), t: 0.5 },
+        ]
+    };
+    SurfaceCurve { crossings: (0..n).flat_map(beside).collect(), closed: true }
+}

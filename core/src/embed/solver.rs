@@ -194,7 +194,7 @@ impl Solver<'_> {
     }
 
     /// The angles of the guiding field; at first, without those of a field before, in several rounds.
-    pub(super) fn angles(
+    fn angles(
         &self,
         net: &Net,
         metric: &Metric,

@@ -15,6 +15,9 @@ use crate::surface::SurfaceCurve;
 /// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
 /// half a degree.
 const PATCH: f64 = 0.005;
+/// What the energy of the map over the area is worth, likewise: 0.1 is that of a layout that suits the surface well, with
+/// 0.7 nodes end up where the map has to be stretched.
+const ENERGY: f64 = 4.0;
 /// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
 const QUARTER: f64 = 0.01;
 /// What a node is worth that cannot be embedded well: of two patches or of more than six.
@@ -62,7 +65,11 @@ pub(super) fn fit(model: &Model, curves: &[&SurfaceCurve], progress: &Progress) 
     let quarters: i32 = layout.nodes.iter().map(|n| index(n).abs()).sum();
     let extreme = layout.nodes.iter().filter(|n| !USUAL.contains(&index(n))).count();
     let patches = layout.patches.len();
-    let price = foreseen.alignment + PATCH * patches as f64 + QUARTER * f64::from(quarters) + EXTREME * extreme as f64;
+    let price = foreseen.alignment
+        + ENERGY * foreseen.energy
+        + PATCH * patches as f64
+        + QUARTER * f64::from(quarters)
+        + EXTREME * extreme as f64;
     let fit = Fit { alignment: foreseen.alignment, patches, irregular: layout.n_irregular(), price };
     Ok((fit, foreseen.shares))
 }

@@ -33,7 +33,7 @@ pub const ROUNDS: usize = 60;
 /// Rounds in a row without a change after which no better layout is expected.
 const IDLE: usize = 16;
 /// Triangles of the mesh that layouts are tried on, and how many times as many a mesh has that is given such a proxy.
-const ROUGH: u32 = 8000;
+const ROUGH: u32 = 6000;
 const WORTH: usize = 2;
 /// Points whose loops are candidates in a round, and how many loops of all are tried.
 const POINTS: usize = 4;

@@ -1,5 +1,7 @@
 //! A designer's steps on small models.
 
+mod improving;
+
 use std::path::Path;
 
 use glam::DVec3;

@@ -12,9 +12,11 @@ mod geodesics;
 mod graph;
 mod mask;
 mod proposals;
+mod queue;
 mod search;
 mod seed;
 mod stars;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -17,8 +17,8 @@ const SAME_LENGTH: f64 = 1.3;
 /// Where the cheapest route shrinks to a point as a curve, the next ones up to this multiple of its cost are tried.
 const FALLBACK_FACTOR: f64 = 2.0;
 
-/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about two
-/// milliseconds, in which most loops found first give way to better ones.
+/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about one
+/// millisecond, in which most loops found first give way to better ones.
 const PATIENCE: u64 = 4000;
 
 /// What is known of a loop that is handed out early.
@@ -48,8 +48,8 @@ pub struct ProposalQuery<'a> {
     pub separation: f64,
     /// A loop found nearby under the same mask: the search starts from what it becomes where it passes the vertex.
     pub nearby: Option<&'a FoundLoop>,
-    /// Most search states to settle before the best so far is returned unproved. A state takes about half a
-    /// microsecond.
+    /// Most search states to settle before the best so far is returned unproved. A state takes about a
+    /// quarter of a microsecond.
     pub budget: u64,
 }
 

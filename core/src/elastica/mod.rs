@@ -7,6 +7,7 @@
 
 mod anchors;
 mod boundary;
+mod classes;
 mod direction;
 mod geodesics;
 mod graph;
@@ -25,6 +26,7 @@ mod vicinity;
 mod weights;
 
 pub use anchors::{Anchor, AnchorQuery};
+pub use classes::LoopClasses;
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
 pub use mask::DirectionMask;
 pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals};

@@ -11,7 +11,8 @@ use std::collections::BinaryHeap;
 use super::graph::State;
 
 /// Bits of a key's mantissa that tell buckets apart. With 128 buckets to each doubling of a key, a bucket holds some
-/// hundred entries where an ordinary search ends; half or twice as many buckets make no difference.
+/// hundred entries where an ordinary search ends: the heap, and most of what settling them reads, then fit the fastest
+/// memories.
 const BUCKET_BITS: u32 = 7;
 
 /// Smaller keys share the first bucket; a step on a surface of diagonal 1 costs more.

@@ -137,7 +137,7 @@ mod tests {
         let mut queue = Queue::default();
         let keys = [1.0, 1.001, 2.0, 5.0];
         (0..).zip(keys).for_each(|(e, key)| queue.push(key, e));
-        let mut shown = |queue: &mut Queue| queue.opened().map(|states| states.collect::<Vec<_>>());
+        let shown = |queue: &mut Queue| queue.opened().map(|states| states.collect::<Vec<_>>());
         let mut first = shown(&mut queue).unwrap();
         first.sort_unstable();
         assert_eq!((first, shown(&mut queue)), (vec![0, 1], None));

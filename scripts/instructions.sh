@@ -9,7 +9,7 @@ program=${1:-$root/target/debug/plait}
 
 # Millions of instructions, on the built-in creature, and by how many percent they may be exceeded: compilers and the
 # vector units that a processor offers make a difference of some percent.
-hover=1616
+hover=1180
 strips=816
 margin=25
 

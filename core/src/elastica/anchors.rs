@@ -223,7 +223,7 @@ impl<'a> Round<'a> {
             self.home[last].push(0.0, source);
         }
         while let Some(leg) = earliest(self.home) {
-            let Some((d, y)) = self.home[leg].settle() else { continue };
+            let Some((d, y)) = self.home[leg].settle(graph) else { continue };
             meter.tick()?;
             for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
                 let reached = d + graph.step(y, z);
@@ -281,7 +281,7 @@ impl<'a> Round<'a> {
                 }
             }
             let Some(next) = earliest(ahead) else { break };
-            let Some((key, s)) = ahead[next].settle() else { continue };
+            let Some((key, s)) = ahead[next].settle(graph) else { continue };
             if key >= cost {
                 break;
             }
@@ -303,7 +303,7 @@ fn expand(
     meter: &mut Meter,
     mut reach: impl FnMut(State, f32),
 ) -> Result<(), Stop> {
-    let Some((d, e)) = field.settle() else { return Ok(()) };
+    let Some((d, e)) = field.settle(graph) else { return Ok(()) };
     meter.tick()?;
     graph.expand(e, |f, step| {
         let reached = d + step;
@@ -319,8 +319,8 @@ fn expand(
 }
 
 /// The leg with the smallest key in its queue.
-fn earliest(legs: &[Field]) -> Option<usize> {
-    let tops = legs.iter().map(Field::top).enumerate().filter(|(_, top)| top.is_finite());
+fn earliest(legs: &mut [Field]) -> Option<usize> {
+    let tops = legs.iter_mut().map(Field::top).enumerate().filter(|(_, top)| top.is_finite());
     tops.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
@@ -368,7 +368,7 @@ impl Passage<'_> {
         }
         let (mut cost, mut end) = (f32::INFINITY, None);
         while let Some(leg) = earliest(legs) {
-            let Some((d, e)) = legs[leg].settle() else { continue };
+            let Some((d, e)) = legs[leg].settle(graph) else { continue };
             if d >= cost {
                 break;
             }

@@ -59,7 +59,7 @@ impl ElasticaGraph {
             }
         }
         let mut settled = 0u32;
-        while let Some((d, e)) = field.settle() {
+        while let Some((d, e)) = field.settle(self) {
             settled += 1;
             if settled.is_multiple_of(4096) {
                 progress.check()?;
@@ -117,7 +117,7 @@ impl<'a> Exits<'a> {
             field.set(a, 0.0, NO_STATE, 0);
             field.push(start, a);
         }
-        while let Some((_, e)) = field.settle().filter(|&(key, _)| key < cost) {
+        while let Some((_, e)) = field.settle(graph).filter(|&(key, _)| key < cost) {
             meter.tick()?;
             settled.push(e);
             let d = field.dist(e);

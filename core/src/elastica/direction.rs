@@ -16,7 +16,7 @@ impl ElasticaGraph {
             field.push(0.0, a);
         }
         let mut farthest = 0.0;
-        while let Some((d, e)) = field.settle() {
+        while let Some((d, e)) = field.settle(self) {
             farthest = d;
             self.expand(e, |f, step| {
                 if field.improves(f, d + step) {
@@ -44,7 +44,7 @@ impl LoopSearch<'_> {
         while root.top() + far.top() < cost {
             let forwards = root.top() <= far.top();
             let (near, other) = if forwards { (&mut *root, &*far) } else { (&mut *far, &*root) };
-            let Some((d, e)) = near.settle() else { break };
+            let Some((d, e)) = near.settle(graph) else { break };
             self.meter.tick()?;
             graph.expand(e, |f, step| {
                 let reached = d + step;

@@ -2,14 +2,13 @@
 //!
 //! A state of the search is a directed geodesic `e` of `g`. It is followed by the geodesics `f` that leave its end
 //! within 30° of straight on; as the geodesics around a vertex are sorted by angle, these are one (cyclic) range,
-//! found once. The price of a step is (8.2) of the source:
+//! found once, and the prices of steps into them, which are (8.2) of the source, are kept in their order:
 //!
 //! `w(e, f) = |e′| (1 + α ½ (q(e) + q(f))) + β γ² / min(|e|, |f|)`, with `|e′| = γ m / (2 tan ½γ) + ½ ||e| − |f||`.
 //!
 //! Every number in it is symmetric bit for bit, so that `w(e, f) = w(rev f, rev e)` exactly: the search relies on
 //! it, as it lets one distance field serve both ways.
 
-use std::f32::consts::PI;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, OnceLock};
 
@@ -18,6 +17,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::geodesics::{Pair, geodesics};
+use super::steps::Window;
 use super::unfold::{Corners, direction_in_face};
 use super::weights::Weights;
 use crate::mesh::{TriMesh, VertexId};
@@ -86,30 +86,15 @@ pub enum ElasticaError {
     TooLarge,
 }
 
-/// How many places before the one computed the first allowed turn is looked for: rounding moves it by one at most.
-const NEARLY: usize = 2;
-
 /// What a step reads of a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     /// Tangent angle at the start.
-    out: f32,
+    pub(super) out: f32,
     /// Tangent angle of the way back, at the end.
-    back: f32,
+    pub(super) back: f32,
     pub(super) length: f32,
     pub(super) alignment: f32,
-}
-
-/// The states that may follow a state: a range around its end, which may be wrapped.
-#[derive(Debug, Clone, Copy, Default)]
-struct Window {
-    /// The first of them.
-    start: State,
-    /// Its position among the states of the vertex.
-    offset: u16,
-    count: u16,
-    /// How many of them are the first states of the vertex.
-    wrapped: u16,
 }
 
 /// The graph `g` of a mesh, with the turns of `g′` as ranges.
@@ -125,7 +110,9 @@ pub struct ElasticaGraph {
     pub(super) nodes: Vec<Node>,
     pub(super) target: Vec<u32>,
     pub(super) reverse: Vec<State>,
-    window: Vec<Window>,
+    pub(super) window: Vec<Window>,
+    /// The prices of all steps.
+    pub(super) prices: Vec<f32>,
     /// Middle of each geodesic, by face: first entry of each face, then state and angle in the face.
     pub(super) middle_first: Vec<u32>,
     pub(super) middle: Vec<(State, f32)>,
@@ -166,10 +153,15 @@ impl ElasticaGraph {
         if pairs.len() >= (NO_STATE / 2) as usize {
             return Err(ElasticaError::TooLarge);
         }
-        Ok(Self::assemble(mesh, corners, *options, &pairs))
+        Self::assemble(mesh, corners, *options, &pairs)
     }
 
-    fn assemble(mesh: Arc<TriMesh>, corners: Corners, options: ElasticaOptions, pairs: &[Pair]) -> Self {
+    fn assemble(
+        mesh: Arc<TriMesh>,
+        corners: Corners,
+        options: ElasticaOptions,
+        pairs: &[Pair],
+    ) -> Result<Self, ElasticaError> {
         let mut first = vec![0u32; mesh.n_vertices() + 1];
         for end in pairs.iter().flat_map(|p| p.ends) {
             first[end as usize + 1] += 1;
@@ -219,37 +211,13 @@ impl ElasticaGraph {
             target,
             reverse,
             window: Vec::new(),
+            prices: Vec::new(),
             middle_first,
             middle,
             ways_out: OnceLock::new(),
         };
-        graph.window = (0..graph.n_states()).into_par_iter().map(|e| graph.find_window(e as State)).collect();
-        graph
-    }
-
-    fn find_window(&self, e: State) -> Window {
-        let states = self.leaving(VertexId(self.target[e as usize]));
-        let n = (states.end - states.start) as usize;
-        let max_turn = self.options.max_turn as f32;
-        let allowed = |i: usize| self.turn(e, states.start + (i % n) as u32) <= max_turn;
-        // They begin about where the largest turn leads to.
-        let lowest = (self.nodes[e as usize].back + PI - max_turn).rem_euclid(2.0 * PI);
-        let around = &self.nodes[states.start as usize..states.end as usize];
-        let about = around.partition_point(|node| node.out < lowest) + n.saturating_sub(NEARLY);
-        let begins = |&i: &usize| allowed(i) && !allowed(i + n - 1);
-        let (offset, count) = match (about..about + n).find(begins) {
-            Some(i) => (i % n, (1..n).find(|&k| !allowed(i + k)).unwrap_or(n)),
-            None => (0, if n > 0 && allowed(0) { n } else { 0 }),
-        };
-        let wrapped = (offset + count).saturating_sub(n);
-        let start = states.start + offset as u32;
-        Window { start, offset: offset as u16, count: count as u16, wrapped: wrapped as u16 }
-    }
-
-    /// Turning angle from `e` into `f`, which leaves the end of `e`. The same number from `rev f` into `rev e`.
-    #[inline]
-    pub(super) fn turn(&self, e: State, f: State) -> f32 {
-        turn(&self.nodes[e as usize], &self.nodes[f as usize])
+        graph.find_steps()?;
+        Ok(graph)
     }
 
     /// The mesh the graph lies on.
@@ -262,14 +230,10 @@ impl ElasticaGraph {
         self.nodes.len()
     }
 
-    /// Number of steps between states.
-    pub fn n_steps(&self) -> usize {
-        self.window.iter().map(|w| w.count as usize).sum()
-    }
-
     /// Bytes held, without the mesh.
     pub fn bytes(&self) -> usize {
         self.n_states() * (size_of::<Node>() + size_of::<Window>() + 8)
+            + self.prices.len() * size_of::<f32>()
             + self.middle.len() * 8
             + self.mesh.n_halfedges() * 8
     }
@@ -283,50 +247,6 @@ impl ElasticaGraph {
     #[inline]
     pub(super) fn leaving(&self, v: VertexId) -> std::ops::Range<State> {
         self.first[v.index()]..self.first[v.index() + 1]
-    }
-
-    /// The states that may follow `e`.
-    #[inline]
-    pub(super) fn successors(&self, e: State) -> impl Iterator<Item = State> + use<> {
-        let Window { start, offset, count, wrapped } = self.window[e as usize];
-        let first = start - u32::from(offset);
-        (start..start + u32::from(count - wrapped)).chain(first..first + u32::from(wrapped))
-    }
-
-    /// Shows every state that may follow `e`, and the price of that step, to `visit`.
-    #[inline]
-    pub(super) fn expand(&self, e: State, mut visit: impl FnMut(State, f32)) {
-        let (alpha, beta) = (self.options.alpha as f32, self.options.beta as f32);
-        let from = &self.nodes[e as usize];
-        let window = &self.window[e as usize];
-        let first = window.start - u32::from(window.offset);
-        let wrapped = u32::from(window.wrapped);
-        for (start, count) in [(window.start, u32::from(window.count) - wrapped), (first, wrapped)] {
-            for (f, to) in (start..).zip(&self.nodes[start as usize..(start + count) as usize]) {
-                let [length, alignment, bending] = price(from, to, alpha, beta);
-                visit(f, length + alignment + bending);
-            }
-        }
-    }
-
-    /// Whether `f` may follow `e`.
-    #[inline]
-    pub(super) fn follows(&self, e: State, f: State) -> bool {
-        self.leaving(VertexId(self.target[e as usize])).contains(&f) && self.turn(e, f) <= self.options.max_turn as f32
-    }
-
-    /// Parts of the price of the step from `e` into `f`: length, alignment and bending, weighted.
-    #[inline]
-    pub(super) fn step_parts(&self, e: State, f: State) -> [f32; 3] {
-        let (alpha, beta) = (self.options.alpha as f32, self.options.beta as f32);
-        price(&self.nodes[e as usize], &self.nodes[f as usize], alpha, beta)
-    }
-
-    /// Price of the step from `e` into `f`.
-    #[inline]
-    pub(super) fn step(&self, e: State, f: State) -> f32 {
-        let [length, alignment, bending] = self.step_parts(e, f);
-        length + alignment + bending
     }
 
     /// Price of half of a state, where an open curve ends on the boundary: length and alignment.
@@ -354,25 +274,6 @@ impl ElasticaGraph {
         let (h, local) = self.corners.locate(&self.mesh, self.origin(e), self.out_angle(e));
         direction_in_face(&self.mesh, h, local)
     }
-}
-
-#[inline]
-fn turn(from: &Node, to: &Node) -> f32 {
-    ((to.out - from.back).abs() - PI).abs()
-}
-
-/// Parts of the price of a step: length, alignment and bending, weighted.
-#[inline]
-fn price(a: &Node, b: &Node, alpha: f32, beta: f32) -> [f32; 3] {
-    let turn = turn(a, b);
-    // Not `min`, whose care for what is not a number costs.
-    let least = if a.length < b.length { a.length } else { b.length };
-    // ½γ / tan ½γ by its series; the next term is below 1e-6 at 30°.
-    let x = 0.25 * turn * turn;
-    let arc = 1.0 - x * (1.0 / 3.0 + x * (1.0 / 45.0 + x * (2.0 / 945.0)));
-    let length = arc * least + 0.5 * (a.length - b.length).abs();
-    let alignment = alpha * 0.5 * (a.alignment + b.alignment) * length;
-    [length, alignment, beta * turn * turn / least]
 }
 
 fn check_length(given: usize, expected: usize) -> Result<(), ElasticaError> {

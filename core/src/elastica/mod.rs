@@ -7,14 +7,17 @@
 
 mod anchors;
 mod boundary;
+mod classes;
 mod direction;
 mod geodesics;
 mod graph;
 mod mask;
 mod proposals;
+mod queue;
 mod search;
 mod seed;
 mod stars;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -23,6 +26,7 @@ mod vicinity;
 mod weights;
 
 pub use anchors::{Anchor, AnchorQuery};
+pub use classes::LoopClasses;
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
 pub use mask::DirectionMask;
 pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals};

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::classes::LoopClasses;
 use super::graph::{ElasticaGraph, State};
 use super::mask::DirectionMask;
 use super::search::{Ball, LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
@@ -14,11 +15,15 @@ use crate::surface::SurfaceCurve;
 /// factor: then neither leaves out what the other goes round.
 const SAME_LENGTH: f64 = 1.3;
 
+/// Cosine of 45°: loops of one class that pass the vertex in directions further apart are different strips, those nearer
+/// are one shifted to the side. Strips with less between them are equivalent (Campen, section 8.2.2).
+const OTHER_DIRECTION: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Where the cheapest route shrinks to a point as a curve, the next ones up to this multiple of its cost are tried.
 const FALLBACK_FACTOR: f64 = 2.0;
 
-/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about two
-/// milliseconds, in which most loops found first give way to better ones.
+/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about one
+/// millisecond, in which most loops found first give way to better ones.
 const PATIENCE: u64 = 4000;
 
 /// What is known of a loop that is handed out early.
@@ -46,17 +51,29 @@ pub struct ProposalQuery<'a> {
     pub max: usize,
     /// Alternatives keep this distance somewhere from every cheaper loop (in mesh units, measured along edges).
     pub separation: f64,
+    /// Of the loops of one class that pass the vertex in about the same direction only the cheapest is wanted.
+    pub classes: Option<&'a LoopClasses>,
     /// A loop found nearby under the same mask: the search starts from what it becomes where it passes the vertex.
     pub nearby: Option<&'a FoundLoop>,
-    /// Most search states to settle before the best so far is returned unproved. A state takes about half a
-    /// microsecond.
+    /// Most search states to settle before the best so far is returned unproved. A state takes about a
+    /// quarter of a microsecond.
     pub budget: u64,
 }
 
 impl<'a> ProposalQuery<'a> {
     /// The cheapest loop through a vertex, proved within about a second on ordinary meshes.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
-        Self { vertex, direction: None, mask, factor: 1.0, max: 1, separation: 0.05, nearby: None, budget: 4_000_000 }
+        Self {
+            vertex,
+            direction: None,
+            mask,
+            factor: 1.0,
+            max: 1,
+            separation: 0.05,
+            classes: None,
+            nearby: None,
+            budget: 4_000_000,
+        }
     }
 
     /// The cheapest loop and up to 15 alternatives that cost at most half as much again.
@@ -92,6 +109,15 @@ pub struct Proposals {
     pub proved: bool,
     /// Search states settled.
     pub settled: u64,
+}
+
+/// A loop that is proposed, and what others are compared with.
+struct Kept {
+    found: FoundLoop,
+    /// The vertices within the separation of it; sorted.
+    near: Vec<VertexId>,
+    class: Option<u64>,
+    heading: DVec3,
 }
 
 impl ElasticaGraph {
@@ -159,26 +185,39 @@ impl ElasticaGraph {
         let Some(limit) = routes.first().map(|r| r.cost * query.factor.max(1.0) as f32 * ROUNDING) else {
             return Vec::new();
         };
-        let mut found: Vec<(FoundLoop, Vec<VertexId>)> = Vec::new();
+        let mut kept: Vec<Kept> = Vec::new();
         for route in routes.iter().take_while(|r| r.cost <= limit) {
-            if found.len() >= query.max {
+            if kept.len() >= query.max {
                 break;
             }
-            let known = |l: &FoundLoop, near: &[VertexId]| {
-                let ratio = self.parts(route)[0] / l.length;
-                (1.0 / SAME_LENGTH..SAME_LENGTH).contains(&ratio)
-                    && l.curve.closed == route.closed
-                    && route.states.iter().all(|&e| near.binary_search(&self.origin(e)).is_ok())
-            };
-            if found.iter().any(|(l, near)| known(l, near)) {
+            if kept.iter().any(|k| self.keeps_to(route, k)) {
                 continue;
             }
-            if let Some(curve) = self.found(route) {
-                let near = vicinity.of(&self.mesh, &curve.curve, query.separation);
-                found.push((curve, near));
+            let Some(found) = self.found(route) else { continue };
+            let class = query.classes.and_then(|c| c.of(&self.mesh, &found.curve));
+            let heading = self.heading(route);
+            let shifted = |k: &Kept| k.class == class && k.heading.dot(heading).abs() > OTHER_DIRECTION;
+            if class.is_some() && kept.iter().any(shifted) {
+                continue;
             }
+            let near = vicinity.of(&self.mesh, &found.curve, query.separation);
+            kept.push(Kept { found, near, class, heading });
         }
-        found.into_iter().map(|(l, _)| l).collect()
+        kept.into_iter().map(|k| k.found).collect()
+    }
+
+    /// Whether a route is a loop kept, but for details.
+    fn keeps_to(&self, route: &Route, kept: &Kept) -> bool {
+        let ratio = self.parts(route)[0] / kept.found.length;
+        (1.0 / SAME_LENGTH..SAME_LENGTH).contains(&ratio)
+            && kept.found.curve.closed == route.closed
+            && route.states.iter().all(|&e| kept.near.binary_search(&self.origin(e)).is_ok())
+    }
+
+    /// The direction in which a loop passes the vertex it starts at.
+    fn heading(&self, route: &Route) -> DVec3 {
+        let (Some(&first), Some(&last)) = (route.states.first(), route.states.last()) else { return DVec3::ZERO };
+        (self.departure(first) - self.departure(self.reverse[last as usize])).normalize_or_zero()
     }
 
     /// Length, alignment and bending of a route.

@@ -13,13 +13,12 @@
 //!
 //! Reversal symmetry of the prices carries 1 and 2: one field from `v` serves both ways.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::sync::Mutex;
 
 use super::boundary::ExitMemory;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
+use super::queue::Queue;
 use super::stars::Fan;
 use super::vicinity::Vicinity;
 use crate::mesh::VertexId;
@@ -38,9 +37,6 @@ struct Trail {
     /// Index among the states leaving the source; with several legs, the leg of the parent.
     origin: u16,
 }
-
-/// States in the order of a key, as bits above the state.
-type Queue = BinaryHeap<Reverse<u64>>;
 
 /// Tentative distances of one search, with its queue.
 ///
@@ -110,26 +106,41 @@ impl Field {
 
     #[inline]
     pub(super) fn push(&mut self, key: f32, e: State) {
-        self.queue.push(Reverse(u64::from(key.to_bits()) << 32 | u64::from(e)));
+        self.queue.push(key, e);
     }
 
     /// The next state that is not settled, with its key; it is settled now.
     #[inline]
-    pub(super) fn settle(&mut self) -> Option<(f32, State)> {
+    pub(super) fn settle(&mut self, graph: &ElasticaGraph) -> Option<(f32, State)> {
         loop {
-            let Reverse(entry) = self.queue.pop()?;
-            let e = entry as State;
+            self.fetch(graph);
+            let (key, e) = self.queue.pop()?;
             if !self.is_settled(e) {
                 self.labels[e as usize] -= 1 << 32;
-                return Some((f32::from_bits((entry >> 32) as u32), e));
+                return Some((key, e));
             }
         }
     }
 
+    /// Reads what settling the states of the nearest bucket will read, so that it need not be waited for one state after
+    /// the other: a search jumps about in tables that no fast memory holds.
+    #[inline]
+    fn fetch(&mut self, graph: &ElasticaGraph) {
+        let Some(states) = self.queue.opened() else { return };
+        let (labels, trails) = (&self.labels, &self.trails);
+        let read = |e: State| {
+            let (next, price) = graph.ahead(e);
+            let [e, back, next] = [e, graph.reverse[e as usize], next].map(|s| s as usize);
+            let label = labels[e] ^ labels[back] ^ labels[next];
+            label as u32 ^ price ^ trails[e].parent ^ trails[next].parent
+        };
+        std::hint::black_box(states.map(read).fold(0, |all, read| all ^ read));
+    }
+
     /// Smallest key in the queue, infinite if it is empty.
     #[inline]
-    pub(super) fn top(&self) -> f32 {
-        self.queue.peek().map_or(f32::INFINITY, |Reverse(entry)| f32::from_bits((entry >> 32) as u32))
+    pub(super) fn top(&mut self) -> f32 {
+        self.queue.top()
     }
 
     /// The state before `e`, and the tag it was set with.
@@ -269,14 +280,25 @@ impl LoopSearch<'_> {
                 outcome = Ok(Ball::Growing);
                 break;
             }
-            let Some((d, e)) = root.settle() else { break };
+            let Some((d, e)) = root.settle(graph) else { break };
             if let Err(stop) = self.meter.tick() {
                 outcome = Err(stop);
                 break;
             }
             patience = patience.map(|p| p - 1);
             ball.push(e);
-            let origin = root.parent(e).1;
+            let (before, origin) = root.parent(e);
+            // A loop is seen when the second of two states on it that are each other's reverse is settled.
+            let back = graph.reverse[e as usize];
+            let total = d + root.dist(back);
+            if total < cost {
+                let (after, other) = root.parent(back);
+                let (start, last) = (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
+                if graph.follows(last, start) && total + graph.step(last, start) < cost {
+                    patience = patience.or(pause);
+                    (cost, meet) = (total + graph.step(last, start), Some((before, e, after)));
+                }
+            }
             graph.expand(e, |f, step| {
                 let reached = d + step;
                 if !root.improves(f, reached) || !self.mask.is_open(f) {
@@ -287,25 +309,14 @@ impl LoopSearch<'_> {
                 if reached < 0.5 * cost * slack {
                     root.push(reached, f);
                 }
-                let back = graph.reverse[f as usize];
-                let total = reached + root.dist(back);
-                if total < cost {
-                    let (before, other) = root.parent(back);
-                    let (start, last) = (first + u32::from(origin), graph.reverse[(first + u32::from(other)) as usize]);
-                    if graph.follows(last, start) && total + graph.step(last, start) < cost {
-                        patience = patience.or(pause);
-                        (cost, meet) = (total + graph.step(last, start), Some((e, back, before)));
-                    }
-                }
             });
         }
-        if let Some((e, back, before)) = meet {
-            // The label of `back` may have changed since; those of settled states have not.
-            let mut states = root.chain(e);
-            states.push(graph.reverse[back as usize]);
-            if before != NO_STATE {
-                states.extend(root.chain(before).iter().rev().map(|&s| graph.reverse[s as usize]));
-            }
+        if let Some((before, e, after)) = meet {
+            // The label of the reverse of `e` may have changed since; those of settled states have not.
+            let chain = |s: State| if s == NO_STATE { Vec::new() } else { root.chain(s) };
+            let mut states = chain(before);
+            states.push(e);
+            states.extend(chain(after).iter().rev().map(|&s| graph.reverse[s as usize]));
             *best = Some(Route { cost, states, closed: true });
         }
         outcome
@@ -323,7 +334,7 @@ impl LoopSearch<'_> {
                 root.push(root.dist(x), x);
             }
         }
-        while let Some((d, e)) = root.settle() {
+        while let Some((d, e)) = root.settle(graph) {
             self.meter.tick()?;
             corridor.push(e);
             let origin = root.parent(e).1;

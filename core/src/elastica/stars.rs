@@ -186,7 +186,7 @@ impl Sectors<'_> {
                 field.push(closing, b);
             }
         }
-        while let Some((d, e)) = field.settle() {
+        while let Some((d, e)) = field.settle(graph) {
             meter.tick()?;
             graph.expand(e, |f, step| {
                 let reached = d + step;
@@ -236,7 +236,7 @@ impl Sectors<'_> {
                     }
                 }
             });
-            let Some((_, e)) = star.settle().filter(|&(key, _)| key < cost) else { break };
+            let Some((_, e)) = star.settle(graph).filter(|&(key, _)| key < cost) else { break };
             meter.tick()?;
             (from, d, parent) = (e, star.dist(e), e);
         }

@@ -321,6 +321,39 @@ fn the_cheapest_loop_of_a_torus_is_a_meridian_circle() {
 }
 
 #[test]
+fn of_loops_shifted_over_the_surface_one_is_proposed() {
+    let (round, long) = (graph(torus(48, 24)), graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5))));
+    let mask = DirectionMask::none();
+    let mut fewer = 0;
+    // The corners of an octahedron, and besides a handle, which needs no mark.
+    for (g, marks) in [(round, 0..0), (long, 0..6)] {
+        let classes = LoopClasses::new(g.mesh(), marks.map(VertexId));
+        let mut work = SearchWorkspace::new();
+        for v in sample(&g, 6) {
+            let query = ProposalQuery { factor: 3.0, ..ProposalQuery::alternatives(v, &mask) };
+            let all = g.proposals(&ProposalQuery { max: 1000, ..query }, &mut work, &Progress::new()).unwrap();
+            let query = ProposalQuery { classes: Some(&classes), ..query };
+            let some = g.proposals(&query, &mut work, &Progress::new()).unwrap();
+            assert_eq!(all.loops[0], some.loops[0]);
+            fewer += usize::from(some.loops.len() < all.loops.len());
+            let class = |l: &FoundLoop| classes.of(g.mesh(), &l.curve);
+            let heading = |l: &FoundLoop| {
+                let at = |i: usize| g.mesh().position(l.path[i]);
+                ((at(1) - at(0)).normalize() + (at(0) - at(l.path.len() - 1)).normalize()).normalize()
+            };
+            for (i, l) in some.loops.iter().enumerate() {
+                let same = some.loops[..i].iter().filter(|s| class(s).is_some() && class(s) == class(l));
+                // Geodesics are not straight in space.
+                assert!(same.into_iter().all(|s| heading(s).dot(heading(l)).abs() < 40f64.to_radians().cos()), "{v:?}");
+            }
+            let missing = |l: &&FoundLoop| !some.loops.iter().any(|s| class(s) == class(l));
+            assert!(some.loops.len() == query.max || !all.loops.iter().any(|l| missing(&l)), "{v:?}");
+        }
+    }
+    assert!(fewer > 3, "{fewer}");
+}
+
+#[test]
 fn open_curves_compete_with_loops() {
     let g = graph(tube(24, 40));
     let mask = DirectionMask::none();

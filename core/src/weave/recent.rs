@@ -86,7 +86,8 @@ impl RecentSearches {
         // What was found where the pointer was before.
         let nearby = self.found.iter().rev().find_map(|f| f.best.as_ref());
         let mut searched = |mask: &DirectionMask, work: &mut SearchWorkspace| {
-            let query = ProposalQuery { nearby, ..ProposalQuery::alternatives(vertex, mask) };
+            let classes = Some(&woven.classes);
+            let query = ProposalQuery { nearby, classes, ..ProposalQuery::alternatives(vertex, mask) };
             let found = graph.proposals_with(&query, work, progress, |certainty, l| {
                 if certainty == Certainty::Proved {
                     *best = Some(l.clone());

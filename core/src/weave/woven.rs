@@ -8,7 +8,7 @@ use super::design::Strip;
 use super::model::Model;
 use super::session::WeaveError;
 use crate::dual::{Arrangement, ArrangementError, Colour, Mark, RegionReport, assess};
-use crate::elastica::DirectionMask;
+use crate::elastica::{DirectionMask, LoopClasses};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::strip::StripMap;
@@ -27,6 +27,8 @@ pub struct Woven {
     pub mask: DirectionMask,
     /// Of these only the directions along the strips' spines.
     pub spine_mask: DirectionMask,
+    /// Which loops are one another shifted, past no corner of the shape and no crossing of strips.
+    pub classes: LoopClasses,
     /// The refined mesh of the arrangement as a mesh of its own.
     pub mesh: TriMesh,
     /// The map of all strips on that mesh; `None` without strips, or where it cannot be computed.
@@ -56,8 +58,9 @@ impl Woven {
         if let Some(map) = &strip_map {
             close_inside(model, &arrangement, &mesh, map, &mut mask);
         }
+        let classes = classes(model, &arrangement);
         progress.report("Ready", 1.0);
-        Ok(Self { arrangement, reports, mask, spine_mask, mesh, strip_map })
+        Ok(Self { arrangement, reports, mask, spine_mask, classes, mesh, strip_map })
     }
 
     /// The regions that cannot be nodes yet.
@@ -70,6 +73,18 @@ impl Woven {
     pub fn count(&self, colour: Colour) -> usize {
         self.reports.iter().filter(|r| r.colour == colour).count()
     }
+}
+
+/// A strip on the other side of a corner separates other corners; on the other side of a crossing it crosses the strips in
+/// another order.
+fn classes(model: &Model, arrangement: &Arrangement) -> LoopClasses {
+    let mesh = &*model.mesh;
+    let corners = model.corners.iter().map(|c| c.0);
+    let crossings = arrangement.crossings.iter().map(|c| {
+        let face = FaceId(arrangement.refined.base_face(c.spokes[0] / 3));
+        mesh.face_vertices(face)[0]
+    });
+    LoopClasses::new(mesh, corners.chain(crossings))
 }
 
 /// Closes the directions along a strip's spine in the triangles it passes.

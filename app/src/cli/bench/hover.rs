@@ -87,7 +87,8 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
         figures.proved.push(now.elapsed());
         figures.settled.push(best.settled as f64);
         let now = Instant::now();
-        let query = ProposalQuery::alternatives(vertex, mask);
+        let classes = Some(&session.woven().classes);
+        let query = ProposalQuery { classes, ..ProposalQuery::alternatives(vertex, mask) };
         let all = model.graph.proposals(&query, &mut work, &progress)?;
         figures.alternatives.push(now.elapsed());
         figures.settled_all.push(all.settled as f64);

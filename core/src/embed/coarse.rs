@@ -35,6 +35,8 @@ const ON_PROXY: [f64; 2] = [0.05, 0.6];
 const ON_MESH: [f64; 2] = [0.2, 1.0];
 /// Steps of Newton's method for the first map on the mesh: it starts near, and all that follows makes it better.
 const FIRST_STEPS: usize = 8;
+/// How hard features are pulled there, in multiples of what is usual: they are near isolines already.
+const PULL: f64 = 1e3;
 /// Steps of the nodes on the mesh itself.
 const FINE_STEPS: usize = 1;
 
@@ -89,8 +91,7 @@ fn by_way_of_proxy(
         mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
     let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
     progress.take_part(Some(ON_PROXY));
-    let settings = Settings { exact_features: false, ..job.settings };
-    let on_proxy = Job { surface: coarse, drawing: &drawing, settings, ..*job };
+    let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
     let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
     progress.take_part(Some(ON_MESH));
     let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
@@ -98,9 +99,9 @@ fn by_way_of_proxy(
     let fine = Job { drawing: &drawing, settings, ..*job };
     let drawn = Drawn::new(layout, &drawing, progress)?;
     let guess = levels.guess(&drawn, &coarse.maps);
-    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS), progress)? {
+    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS, PULL), progress)? {
         Ok(start) => Ok(start),
-        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS), progress)?,
+        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS, 1.0), progress)?,
     };
     let mut course = Course::going_on(&fine, &coarse.report, watch);
     let mut done = course.without_folds(&fine, Ok(start), progress)?;

@@ -40,7 +40,7 @@ impl Optimizer<'_> {
     /// See [`EmbeddingError`].
     pub(super) fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let Features::Pulled(mut before) = self.features else { return Ok(()) };
-        if !self.settings.exact_features || !self.sharp.contains(&true) {
+        if !self.sharp.contains(&true) {
             return Ok(());
         }
         progress.report("Bringing features onto isolines", FRACTION);

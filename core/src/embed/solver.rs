@@ -291,11 +291,15 @@ impl Setting<'_> {
             Start::Moved { .. } => FEW,
             Start::Here(_) => 0,
         };
-        let (free, folded) = self.fitted(system, &wanted, few, progress)?;
+        let (free, mut folded) = self.fitted(system, &wanted, few, progress)?;
         let mut found = system.injective(&energy, free.clone());
         if let (None, Start::Here(uv)) = (&found, start) {
             let by = (&*newton, &energy);
-            found = system.approach((&net.mesh, metric), by, (&field.angle, uv), progress)?;
+            match system.approach((&net.mesh, metric), by, (&field.angle, uv), progress)? {
+                Ok(reached) => found = Some(reached),
+                Err(ahead) if ahead.is_empty() => {}
+                Err(ahead) => folded = ahead,
+            }
         } else if found.is_none() && folded.len() <= few {
             let quarters = net.quarters();
             let triangles = system.triangles(&net.mesh, metric, field, objective)?;

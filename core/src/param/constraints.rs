@@ -72,7 +72,8 @@ pub(super) fn add_translations(mesh: &TriMesh, cut: &Cut, values: &mut [f64]) {
         let (l, r) = (2 * cut.wedge[l.index()], 2 * cut.wedge[r.index()]);
         for c in 0..2 {
             let (component, sign) = turned(-path.jump, c);
-            values[2 * (cut.n_wedges + k) + c as usize] = values[(r + c) as usize] - sign * values[(l + component) as usize];
+            values[2 * (cut.n_wedges + k) + c as usize] =
+                values[(r + c) as usize] - sign * values[(l + component) as usize];
         }
     }
 }

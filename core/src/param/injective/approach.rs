@@ -9,14 +9,14 @@ use glam::DVec2;
 
 use super::{Injective, InjectiveEnergy, NewtonSystem, SAFE, first_flat};
 use crate::field::Metric;
-use crate::mesh::TriMesh;
+use crate::mesh::{FaceId, TriMesh};
 use crate::param::solve::SeamlessSystem;
-use crate::param::{ParamError, gradients};
+use crate::param::{ParamError, folds, gradients};
 use crate::progress::Progress;
 
-/// Parts of the way at most: half of it each time leaves a thousandth, which the last part goes at once.
+/// Parts of the way at most: what can be reached is mostly reached in four or less.
 const PARTS: usize = 10;
-/// The least part worth going.
+/// The least part worth going: parts that become shorter and shorter lead nowhere.
 const LEAST: f64 = 0.02;
 /// Steps of Newton's method after each part.
 const STEPS: usize = 3;
@@ -25,7 +25,8 @@ const SAME: f64 = 1e-7;
 
 impl SeamlessSystem {
     /// The map that satisfies the relations and is reached from one without folds that does not, both of this system but
-    /// for its relations; `None` where it cannot be reached. The differences of the relations are as before.
+    /// for its relations. Where it cannot be reached, the triangles that would fold on the rest of the way; none where
+    /// the first map is not one of this system.
     ///
     /// # Errors
     ///
@@ -36,7 +37,7 @@ impl SeamlessSystem {
         (newton, energy): (&NewtonSystem, &InjectiveEnergy<'_>),
         (angle, uv): (&[f64], &[[DVec2; 3]]),
         progress: &Progress,
-    ) -> Result<Option<Injective>, ParamError> {
+    ) -> Result<Result<Injective, Vec<FaceId>>, ParamError> {
         let wanted = self.differences();
         let found = self.in_parts((mesh, metric), (newton, energy), (angle, uv), &wanted, progress);
         self.set_differences(&wanted)?;
@@ -50,26 +51,27 @@ impl SeamlessSystem {
         (angle, uv): (&[f64], &[[DVec2; 3]]),
         wanted: &[f64],
         progress: &Progress,
-    ) -> Result<Option<Injective>, ParamError> {
+    ) -> Result<Result<Injective, Vec<FaceId>>, ParamError> {
         let values = self.values_of(mesh, uv);
         let mut now = self.differences_at(&values);
         self.set_differences(&now)?;
-        let Some(mut at) = self.injective(energy, self.free_of(&values)) else { return Ok(None) };
+        let Some(mut at) = self.injective(energy, self.free_of(&values)) else { return Ok(Err(Vec::new())) };
         if !at.map.uv.iter().flatten().zip(uv.iter().flatten()).all(|(a, b)| (*a - *b).length() < SAME) {
-            return Ok(None);
+            return Ok(Err(Vec::new()));
         }
+        let mut ahead = Vec::new();
         for part in 0..PARTS {
             progress.check()?;
             let rest: Vec<f64> = wanted.iter().zip(&now).map(|(w, n)| w - n).collect();
             self.set_differences(&rest)?;
             let way = self.least_change(metric, angle, &at.map.uv)?;
             let whole: Vec<[DVec2; 3]> = self.map(&way).uv;
-            let ahead = |(p, d): (&[DVec2; 3], &[DVec2; 3])| [0, 1, 2].map(|k| p[k] + d[k]);
-            let there: Vec<_> = at.map.uv.iter().zip(&whole).map(ahead).collect();
-            let share = (SAFE * first_flat(&at.map.uv, &there)).min(1.0);
+            let moved = |(p, d): (&[DVec2; 3], &[DVec2; 3])| [0, 1, 2].map(|k| p[k] + d[k]);
+            ahead = at.map.uv.iter().zip(&whole).map(moved).collect();
+            let share = (SAFE * first_flat(&at.map.uv, &ahead)).min(1.0);
             tracing::debug!(part, share, "towards the relations");
             if share < LEAST {
-                return Ok(None);
+                break;
             }
             for (n, r) in now.iter_mut().zip(&rest) {
                 *n += share * r;
@@ -77,14 +79,14 @@ impl SeamlessSystem {
             let done = share == 1.0;
             self.set_differences(if done { wanted } else { &now })?;
             let free = at.free.iter().zip(&way).map(|(y, d)| y + share * d).collect();
-            let Some(next) = self.injective(energy, free) else { return Ok(None) };
+            let Some(next) = self.injective(energy, free) else { break };
             at = next;
             if done {
-                return Ok(Some(at));
+                return Ok(Ok(at));
             }
             self.descend(newton, energy, &mut at, STEPS, progress)?;
         }
-        Ok(None)
+        Ok(Err(folds(&ahead)))
     }
 
     /// The free variables of the least change of a map that changes the differences of the relations by those at hand:

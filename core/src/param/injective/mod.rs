@@ -78,6 +78,20 @@ impl NewtonSystem {
     pub(super) fn shares(&self) -> Arc<Scatter> {
         self.shares.clone()
     }
+
+    /// The Hessian, made positive definite.
+    fn matrix(&self, locals: &[Derivatives]) -> SparseHermitian<f64> {
+        let mut open = self.shares.zero.clone();
+        for (f, local) in locals.iter().enumerate() {
+            self.shares.add(f, &local.hessian, &mut open);
+        }
+        let mut matrix = self.fold.zero.clone();
+        for (k, (_, _, value)) in open.entries().enumerate() {
+            self.fold.add(k, &[value], &mut matrix);
+        }
+        matrix.raise_diagonal(GROUND);
+        matrix
+    }
 }
 
 impl SeamlessSystem {
@@ -183,13 +197,7 @@ impl SeamlessSystem {
 
     /// Goes along a direction as far as it makes the energy less by enough; tells which share of it that is, if it does
     /// at all.
-    fn search(
-        &self,
-        energy: &InjectiveEnergy<'_>,
-        at: &mut Injective,
-        direction: &[f64],
-        slope: f64,
-    ) -> Option<f64> {
+    fn search(&self, energy: &InjectiveEnergy<'_>, at: &mut Injective, direction: &[f64], slope: f64) -> Option<f64> {
         if !(slope > 0.0 && slope.is_finite()) {
             return None;
         }
@@ -216,10 +224,13 @@ impl SeamlessSystem {
         uv: &[[DVec2; 3]],
     ) -> (SparseHermitian<f64>, Vec<f64>) {
         let locals: Vec<Derivatives> = uv.par_iter().enumerate().map(|(f, w)| energy.derivatives(f, w)).collect();
-        let mut open = newton.shares.zero.clone();
+        rayon::join(|| newton.matrix(&locals), || self.downhill(&locals))
+    }
+
+    /// The direction of steepest descent.
+    fn downhill(&self, locals: &[Derivatives]) -> Vec<f64> {
         let mut load = vec![0.0; self.seams().n_free()];
         for (f, local) in locals.iter().enumerate() {
-            newton.shares.add(f, &local.hessian, &mut open);
             for (k, share) in local.gradient.iter().enumerate() {
                 let (variable, sign) = constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
                 for &(z, c) in self.seams().expression(variable as usize).0 {
@@ -227,18 +238,13 @@ impl SeamlessSystem {
                 }
             }
         }
-        let mut matrix = newton.fold.zero.clone();
-        for (k, (_, _, value)) in open.entries().enumerate() {
-            newton.fold.add(k, &[value], &mut matrix);
-        }
-        let mut downhill = vec![0.0; matrix.n()];
+        let mut downhill = vec![0.0; self.n_free()];
         for (z, b) in load.into_iter().enumerate() {
             for &(y, c) in self.ties().expression(z).0 {
                 downhill[y as usize] += c * b;
             }
         }
-        matrix.raise_diagonal(GROUND);
-        (matrix, downhill)
+        downhill
     }
 }
 

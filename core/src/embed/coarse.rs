@@ -4,7 +4,7 @@
 //! So the layout is carried to a proxy of the mesh, optimised there, and carried back; what is left to do on the mesh
 //! itself is a first map and a few steps that nodes are off.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -35,7 +35,9 @@ const ON_PROXY: [f64; 2] = [0.05, 0.6];
 const ON_MESH: [f64; 2] = [0.2, 1.0];
 /// Steps of Newton's method for the first map on the mesh: it starts near, and all that follows makes it better.
 const FIRST_STEPS: usize = 8;
-/// Steps of the nodes on the mesh itself.
+/// How hard features are pulled there, in multiples of what is usual: they are near isolines already.
+const PULL: f64 = 1e3;
+/// Steps of the nodes on the mesh itself where there are no features: with these pulled hard no step made the energy less.
 const FINE_STEPS: usize = 1;
 
 /// Embeds a layout by way of a smaller mesh. `None` if that is not worth while or does not lead anywhere.
@@ -89,18 +91,18 @@ fn by_way_of_proxy(
         mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
     let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
     progress.take_part(Some(ON_PROXY));
-    let settings = Settings { exact_features: false, ..job.settings };
-    let on_proxy = Job { surface: coarse, drawing: &drawing, settings, ..*job };
+    let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
     let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
     progress.take_part(Some(ON_MESH));
     let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
-    let settings = Settings { steps: FINE_STEPS.min(job.settings.steps), ..job.settings };
+    let steps = if surface.sharp.contains(&true) { 0 } else { FINE_STEPS };
+    let settings = Settings { steps: steps.min(job.settings.steps), ..job.settings };
     let fine = Job { drawing: &drawing, settings, ..*job };
     let drawn = Drawn::new(layout, &drawing, progress)?;
-    let guess = levels.guess(&drawn, &coarse.maps);
-    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS), progress)? {
+    let guess = levels.guess(layout, &drawn, &coarse.maps);
+    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS, PULL), progress)? {
         Ok(start) => Ok(start),
-        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS), progress)?,
+        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS, 1.0), progress)?,
     };
     let mut course = Course::going_on(&fine, &coarse.report, watch);
     let mut done = course.without_folds(&fine, Ok(start), progress)?;
@@ -156,7 +158,8 @@ impl Levels<'_> {
     }
 
     /// The map of the proxy on a drawing on the mesh: coordinates of the corners of each triangle up to a translation.
-    fn guess(&self, drawn: &Drawn, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
+    fn guess(&self, layout: &QuadLayout, drawn: &Drawn, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
+        let turns = turns(layout);
         let mut pieces: Vec<Vec<Affine>> = vec![Vec::new(); self.proxy.mesh().n_faces()];
         for (p, map) in (0..).zip(maps) {
             for f in map.mesh.faces() {
@@ -171,11 +174,13 @@ impl Levels<'_> {
             let at = SurfacePoint { face, weights: nearest_in_triangle(center, &corners) };
             let there = self.proxy.to_proxy(self.fine, at);
             let at = there.position(self.proxy.mesh());
-            let own = pieces[there.face.index()].iter().filter(|a| a.patch == drawn.patch[f.index()]);
-            own.min_by(|a, b| a.center.distance_squared(at).total_cmp(&b.center.distance_squared(at))).copied()
+            // Arcs run elsewhere on the proxy: what lies between is mapped there in the chart of the patch beyond.
+            let own = |a: &Affine| Some(a.turned(*turns.get(&(drawn.patch[f.index()], a.patch))?));
+            let near = pieces[there.face.index()].iter().filter_map(own);
+            near.min_by(|a, b| a.center.distance_squared(at).total_cmp(&b.center.distance_squared(at)))
         };
         let mut maps: Vec<Option<Affine>> = mesh.faces().collect::<Vec<_>>().into_par_iter().map(found).collect();
-        // Beside an arc that runs elsewhere on the proxy it is the map next to it in the patch.
+        // Where even that is not known it is the map next to it in the patch.
         let mut queue: VecDeque<FaceId> = mesh.faces().filter(|f| maps[f.index()].is_some()).collect();
         while let Some(f) = queue.pop_front() {
             for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|h| mesh.face(h)) {
@@ -195,6 +200,26 @@ impl Levels<'_> {
     fn original_vertex(&self, at: SurfacePoint) -> VertexId {
         self.proxy.to_original(self.fine, at).nearest_vertex(self.fine)
     }
+}
+
+/// For patches that share an arc, and each with itself, by how many quarters the chart of the second is to be turned to
+/// become that of the first but for a translation.
+fn turns(layout: &QuadLayout) -> HashMap<(u32, u32), i32> {
+    let mut sides: Vec<Vec<(u32, i32)>> = vec![Vec::new(); layout.arcs.len()];
+    for (p, patch) in (0..).zip(&layout.patches) {
+        for (i, &(arc, _)) in (0..).zip(&patch.sides) {
+            sides[arc as usize].push((p, i));
+        }
+    }
+    let mut turns: HashMap<(u32, u32), i32> = (0..layout.patches.len() as u32).map(|p| ((p, p), 0)).collect();
+    for list in &sides {
+        if let &[(p, i), (q, j)] = &list[..] {
+            // Side `i` runs in direction `i` of its patch; both patches see it from their left.
+            turns.entry((p, q)).or_insert((i - j + 2).rem_euclid(4));
+            turns.entry((q, p)).or_insert((j - i + 2).rem_euclid(4));
+        }
+    }
+    turns
 }
 
 /// The map of a triangle of the proxy.
@@ -218,6 +243,18 @@ impl Affine {
         let gradients = [gradient(0), gradient(1)];
         let finite = gradients.iter().all(|g| g.is_finite());
         finite.then_some(Self { patch, center: (a + b + c) / 3.0, gradients })
+    }
+
+    /// The same map in a chart turned by so many quarters.
+    fn turned(&self, quarters: i32) -> Self {
+        let [u, v] = self.gradients;
+        let gradients = match quarters {
+            0 => [u, v],
+            1 => [-v, u],
+            2 => [-u, -v],
+            _ => [v, -u],
+        };
+        Self { gradients, ..*self }
     }
 
     fn uv(&self, p: DVec3) -> DVec2 {

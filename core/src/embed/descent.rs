@@ -66,8 +66,6 @@ pub struct Optimizer<'a> {
     pub(super) features: Features,
     /// Edges of features that are only pulled even where others are held; empty: none.
     pub(super) loose: Vec<bool>,
-    /// How strongly features are pulled, as a multiple of what is usual.
-    pub(super) pull: f64,
     pub(super) state: State,
     /// Factor of the steps of every node.
     pub(super) pace: Vec<f64>,
@@ -148,7 +146,6 @@ impl<'a> Optimizer<'a> {
             settings,
             features,
             loose: &[],
-            pull: 1.0,
         };
         let state = match solver.solve(net, metric, None, aim, progress)? {
             Ok(state) => state,
@@ -172,7 +169,6 @@ impl<'a> Optimizer<'a> {
             shape,
             features,
             loose: Vec::new(),
-            pull: 1.0,
             state,
             pace: vec![1.0; layout.nodes.len()],
             heading: vec![DVec3::ZERO; layout.nodes.len()],
@@ -352,6 +348,14 @@ impl<'a> Optimizer<'a> {
         self.solve_for(net, aim, progress)
     }
 
+    /// As [`Self::attempt`], with the nodes where they are and from the map at hand.
+    pub(super) fn attempt_here(&mut self, progress: &Progress) -> Result<Result<State, Folded>, EmbeddingError> {
+        let uv = self.state.solution.map.uv.clone();
+        let start = Start::Here(&uv);
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: NEWTON_STEPS });
+        self.solve_for(self.state.net.clone(), aim, progress)
+    }
+
     /// As [`Self::attempt`], with the map without folds nearest to one of these coordinates, which is left as it is.
     pub(super) fn attempt_at(
         &mut self,
@@ -382,7 +386,6 @@ impl<'a> Optimizer<'a> {
             settings: self.settings,
             features: self.features,
             loose: &self.loose,
-            pull: self.pull,
         };
         let next = solver.solve(net, metric, Some(&self.state.field.angle), aim, progress);
         (self.seamless, self.sizes) = (solver.seamless, solver.sizes);

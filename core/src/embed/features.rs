@@ -13,7 +13,7 @@ use super::feature_lines;
 use super::solver::{Features, Folded};
 use super::state::State;
 use crate::mesh::{FaceId, HalfedgeId};
-use crate::param::{InjectiveEnergy, NewtonSystem, Solution};
+use crate::param::{InjectiveEnergy, SeamlessSystem, Solution};
 use crate::progress::Progress;
 
 /// The part of the whole work that is done by then.
@@ -39,31 +39,30 @@ impl Optimizer<'_> {
     ///
     /// See [`EmbeddingError`].
     pub(super) fn hold_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        if !self.settings.exact_features || self.features == Features::Held || !self.sharp.contains(&true) {
+        let Features::Pulled(mut before) = self.features else { return Ok(()) };
+        if !self.sharp.contains(&true) {
             return Ok(());
         }
         progress.report("Bringing features onto isolines", FRACTION);
         self.synchronise(progress)?;
-        let mut newton = self.newton()?;
         for _ in 0..ROUNDS {
-            for pull in GENTLY {
-                self.pull_harder(pull, newton.as_ref(), progress)?;
+            for pull in GENTLY.into_iter().filter(|&pull| pull >= before) {
+                self.pull_harder(pull, progress)?;
             }
-            self.pull = GENTLY[0];
+            self.features = Features::Pulled(GENTLY[0]);
             if self.attach(progress)? == 0 {
                 break;
             }
-            newton = self.newton()?;
+            // All but what has just been brought there is near already.
+            before = GENTLY[GENTLY.len() - 1];
         }
-        let mut lost = self.pull_hard(newton.as_ref(), progress)?;
+        let mut lost = self.pull_hard(progress)?;
         while lost > 0 {
             let before = (self.state.clone(), self.ground.hold.clone(), self.loose.clone());
             let brought = self.attach_at_steps(progress)?;
             if brought > 0 {
                 self.loose.clear();
-                let newton = self.newton()?;
-                self.pull_harder(GENTLY[GENTLY.len() - 1], newton.as_ref(), progress)?;
-                let now = self.pull_hard(newton.as_ref(), progress)?;
+                let now = self.pull_hard(progress)?;
                 tracing::debug!(before = lost, now, "edges of features let go");
                 if now < lost {
                     lost = now;
@@ -78,9 +77,9 @@ impl Optimizer<'_> {
     }
 
     /// Pulls features as hard as can be; returns how many edges had to be let go.
-    fn pull_hard(&mut self, newton: Option<&NewtonSystem>, progress: &Progress) -> Result<usize, EmbeddingError> {
+    fn pull_hard(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
         for (pull, slope) in HARD {
-            self.pull_harder(pull, newton, progress)?;
+            self.pull_harder(pull, progress)?;
             self.let_go(slope);
         }
         Ok(self.loose.iter().filter(|&&l| l).count())
@@ -93,7 +92,7 @@ impl Optimizer<'_> {
     /// [`EmbeddingError::Folded`] if the map folds even with features only pulled; the state is then as before.
     pub(super) fn solve_loosening(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         for round in 1..=LOOSENINGS {
-            match self.attempt(self.state.net.clone(), progress)? {
+            match self.attempt_here(progress)? {
                 Ok(state) => {
                     self.state = state;
                     return Ok(());
@@ -106,37 +105,31 @@ impl Optimizer<'_> {
         }
         tracing::debug!("features are not isolines exactly");
         self.release_features();
-        self.state = self.solve(self.state.net.clone(), progress)?;
+        self.state = self.attempt_here(progress)?.map_err(|_| EmbeddingError::Folded)?;
         Ok(())
     }
 
     /// Lets features be pulled only, as usual.
     pub(super) fn release_features(&mut self) {
-        self.features = Features::Pulled;
-        self.pull = 1.0;
+        self.features = Features::Pulled(1.0);
         self.loose.clear();
     }
 
     /// Brings the system of the map in line with the state: attempts that failed leave that of another net.
     pub(super) fn synchronise(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        self.state = self.solve(self.state.net.clone(), progress)?;
+        let Solution { map, free, .. } = &self.state.solution;
+        let is_own = |system: &SeamlessSystem| system.n_free() == free.len() && system.map(free).uv == map.uv;
+        if !self.seamless.as_ref().is_some_and(is_own) {
+            self.state = self.attempt_here(progress)?.map_err(|_| EmbeddingError::Folded)?;
+        }
         Ok(())
     }
 
-    fn newton(&mut self) -> Result<Option<NewtonSystem>, EmbeddingError> {
-        Ok(self.seamless.as_mut().map(|system| system.newton()).transpose()?)
-    }
-
     /// Pulls features so many times as hard as usual, in the field at hand.
-    fn pull_harder(
-        &mut self,
-        pull: f64,
-        newton: Option<&NewtonSystem>,
-        progress: &Progress,
-    ) -> Result<(), EmbeddingError> {
-        self.pull = pull;
+    fn pull_harder(&mut self, pull: f64, progress: &Progress) -> Result<(), EmbeddingError> {
+        self.features = Features::Pulled(pull);
         tracing::debug!(pull, "features pulled");
-        self.descend(newton, progress)
+        self.come_to_rest(progress)
     }
 
     /// Lets the map without folds come to rest in the field at hand: a few steps between moves do not get so far.
@@ -145,29 +138,21 @@ impl Optimizer<'_> {
     ///
     /// See [`EmbeddingError`].
     pub(super) fn come_to_rest(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
-        let newton = self.newton()?;
-        self.descend(newton.as_ref(), progress)
-    }
-
-    fn descend(&mut self, newton: Option<&NewtonSystem>, progress: &Progress) -> Result<(), EmbeddingError> {
-        let (Some(system), Some(newton), Some(shape)) = (&self.seamless, newton, self.shape) else { return Ok(()) };
         let pulled = self.pulled();
+        let (Some(system), Some(shape)) = (&mut self.seamless, self.shape) else { return Ok(()) };
+        let newton = system.newton()?;
         let State { metric, field, objective, firmness, solution, .. } = &self.state;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(&pulled);
         let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
-        system.descend(newton, &energy, &mut at, STEPS, progress)?;
+        system.descend(&newton, &energy, &mut at, STEPS, progress)?;
         self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };
         Ok(())
     }
 
     /// The edges of features that are only pulled, towards isolines of which coordinate, and how hard.
     fn pulled(&self) -> Vec<(HalfedgeId, u8, f64)> {
-        let strength = |h: HalfedgeId| match self.features {
-            _ if self.is_loose(h) => Some(1.0),
-            Features::Pulled => Some(self.pull),
-            Features::Held => None,
-        };
-        self.aligned().into_iter().filter_map(|(h, axis)| Some((h, axis, strength(h)?))).collect()
+        let pull = |(h, axis): (HalfedgeId, u8)| Some((h, axis, self.features.strength(self.is_loose(h))?));
+        self.aligned().into_iter().filter_map(pull).collect()
     }
 
     /// The edges of features, and the isolines of which coordinate they are to follow, those let go as well.

@@ -16,7 +16,8 @@ const STIFFER: f64 = 1.5;
 const STIFFEST: f64 = 1e4;
 const FADING: usize = 5;
 const FADE: f64 = 0.7;
-/// Rounds of bringing regular nodes to their crossings before they are held there: every round is a Newton step.
+/// Rounds of bringing regular nodes to their crossings with least squares before they are held there: every round is a
+/// Newton step.
 const SETTLING: usize = 3;
 /// By what share the energy changes when they have come there.
 const SETTLED: f64 = 3e-3;
@@ -30,41 +31,21 @@ impl Optimizer<'_> {
     /// See [`EmbeddingError`].
     pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
         if self.shape.is_some() {
-            self.hold_features(progress)?;
+            self.finish_without_folds(progress)?;
+            return Ok(Vec::new());
         }
-        for _ in 0..SETTLING {
-            let before = self.state.solution.energy;
-            let (Some(state), _) = self.as_far_as_possible(Self::settled, progress)? else { break };
-            self.state = state;
-            if (self.state.solution.energy - before).abs() < SETTLED * before {
-                break;
-            }
-        }
-        if self.shape.is_none() {
-            self.refine(progress)?;
-        }
-        if self.shape.is_some() {
-            self.settle_exactly(progress)?;
-        }
+        self.settle(progress)?;
+        self.refine(progress)?;
         self.roads.hold_all();
         loop {
             self.solve_loosening(progress)?;
             let State { net, solution, .. } = &self.state;
-            if self.shape.is_some()
-                || self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0
-            {
+            if self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
                 break;
             }
         }
         if let Some(edge) = self.settings.integer {
             self.round(edge, progress)?;
-        }
-        if self.shape.is_some() {
-            // On a proxy nothing is final.
-            if self.settings.exact_features {
-                self.come_to_rest(progress)?;
-            }
-            return Ok(Vec::new());
         }
         self.stiffen(progress)?;
         if self.state.flipped() > HOPELESS {
@@ -82,6 +63,31 @@ impl Optimizer<'_> {
         solution.energy = unfolded.energy;
         solution.free = unfolded.y;
         Ok(unfolded.folds)
+    }
+
+    /// As [`Self::finish`] in a map that cannot fold.
+    fn finish_without_folds(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        self.hold_features(progress)?;
+        self.settle_exactly(progress)?;
+        self.roads.hold_all();
+        self.solve_loosening(progress)?;
+        if let Some(edge) = self.settings.integer {
+            self.round(edge, progress)?;
+        }
+        self.come_to_rest(progress)
+    }
+
+    /// Brings regular nodes towards their crossings by steps in a map of least squares.
+    fn settle(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
+        for _ in 0..SETTLING {
+            let before = self.state.solution.energy;
+            let (Some(state), _) = self.as_far_as_possible(Self::settled, progress)? else { break };
+            self.state = state;
+            if (self.state.solution.energy - before).abs() < SETTLED * before {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.

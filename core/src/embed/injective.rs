@@ -87,11 +87,11 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Result<Self, Folded>, EmbeddingError> {
         let drawn = Drawn::new(job.layout, job.drawing, progress)?;
-        Self::from_drawn(job, &drawn, (&drawn.uv, STEPS), progress)
+        Self::from_drawn(job, &drawn, (&drawn.uv, STEPS, 1.0), progress)
     }
 
     /// As [`Self::from_drawing`], from a map near to that with coordinates `uv` of the corners of each triangle, in so many
-    /// steps of Newton's method at most.
+    /// steps of Newton's method at most, with features pulled so many times as hard as usual.
     ///
     /// # Errors
     ///
@@ -99,7 +99,7 @@ impl<'a> Optimizer<'a> {
     pub(super) fn from_drawn(
         job: &Job<'a>,
         drawn: &Drawn,
-        (uv, steps): (&[[DVec2; 3]], usize),
+        (uv, steps, pull): (&[[DVec2; 3]], usize, f64),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
@@ -108,7 +108,7 @@ impl<'a> Optimizer<'a> {
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(uv), steps };
-        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled), progress)
+        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled(pull)), progress)
     }
 
     /// Sets up an optimisation without folds that starts from where another has ended. [`Folded`] if that map folds.

@@ -36,8 +36,6 @@ pub struct Settings {
     pub sizing: bool,
     /// Least length of an arc in the map, in mean edges of the mesh.
     pub spacing: f64,
-    /// Whether features are made isolines exactly in the end, where that is possible; else they are only pulled there.
-    pub exact_features: bool,
     /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
     pub collapse: Option<f64>,
     /// Whether chords are collapsed, one by one, as long as that makes the layout less irregular and the energy no more.
@@ -55,7 +53,6 @@ impl Default for Settings {
             anisotropy: 10.0,
             sizing: true,
             spacing: 1.5,
-            exact_features: true,
             collapse: None,
             simplify: false,
             integer: None,

@@ -50,12 +50,23 @@ pub(super) enum Aim<'s> {
 }
 
 /// What a map is to do about the features of the surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Features {
-    /// They are pulled towards isolines, in a map without folds.
-    Pulled,
+    /// They are pulled towards isolines, in a map without folds, so many times as hard as usual.
+    Pulled(f64),
     /// They are isolines wherever nothing contradicts that.
     Held,
+}
+
+impl Features {
+    /// How hard an edge is pulled, in multiples of what is usual; `None` if it is held.
+    pub(super) fn strength(self, is_loose: bool) -> Option<f64> {
+        match self {
+            _ if is_loose => Some(1.0),
+            Self::Pulled(pull) => Some(pull),
+            Self::Held => None,
+        }
+    }
 }
 
 /// Where a map without folds starts.
@@ -63,6 +74,8 @@ pub(super) enum Features {
 pub(super) enum Start<'s> {
     /// From a map without folds: the coordinates of the corners of each triangle.
     Map(&'s [[DVec2; 3]]),
+    /// From a map without folds on the same net, which need not satisfy what is demanded now.
+    Here(&'s [[DVec2; 3]]),
     /// From the map before nodes moved. Where a node has left its vertex or come to another the field turns with it, and
     /// the gradients as they were in its frame are the better guess.
     Moved {
@@ -103,8 +116,6 @@ pub(super) struct Solver<'s> {
     pub features: Features,
     /// Edges of features that are only pulled even so; empty: none.
     pub loose: &'s [bool],
-    /// How strongly features are pulled, as a multiple of what is usual.
-    pub pull: f64,
 }
 
 impl Solver<'_> {
@@ -128,10 +139,10 @@ impl Solver<'_> {
         let slant = if whole { alignment::WHOLE } else { alignment::SLANT };
         let features = alignment::features(&net, &metric, &field.angle, self.sharp, slant);
         let is_loose = |h: HalfedgeId| self.loose.get(mesh.edge(h).index()).copied().unwrap_or(false);
-        let only_pulled = |f: &(HalfedgeId, u8)| self.features == Features::Pulled || is_loose(f.0);
-        let (pulled, features): (Vec<_>, Vec<_>) = features.into_iter().partition(only_pulled);
-        let strength = |h: HalfedgeId| if is_loose(h) { 1.0 } else { self.pull };
-        let pulled: Vec<_> = pulled.into_iter().map(|(h, axis)| (h, axis, strength(h))).collect();
+        let (pulled, features): (Vec<_>, Vec<_>) =
+            features.into_iter().partition(|f| self.features.strength(is_loose(f.0)).is_some());
+        let pull = |(h, axis): (HalfedgeId, u8)| Some((h, axis, self.features.strength(is_loose(h))?));
+        let pulled: Vec<_> = pulled.into_iter().filter_map(pull).collect();
         let (sizing, sizes) = (self.settings.sizing, self.sizes.take());
         let (lengths, built) = rayon::join(
             || if sizing { lengths((mesh, &metric), &angle, &net.jump, sizes) } else { Ok((Vec::new(), sizes)) },
@@ -264,7 +275,7 @@ impl Setting<'_> {
     ) -> Result<Result<Solution, Folded>, EmbeddingError> {
         let Self { net, metric, field, objective, firmness, pulled } = *self;
         let wanted = match start {
-            Start::Map(uv) => gradients(metric, &field.angle, uv),
+            Start::Map(uv) | Start::Here(uv) => gradients(metric, &field.angle, uv),
             Start::Moved { uv, gradients: before, turned } => {
                 let mut list = gradients(metric, &field.angle, uv);
                 for (f, g) in list.iter_mut().enumerate().filter(|(f, _)| turned[*f]) {
@@ -275,10 +286,21 @@ impl Setting<'_> {
         };
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
         let newton = system.newton()?;
-        let few = if matches!(start, Start::Map(_)) { FEW_AT_FIRST } else { FEW };
-        let (free, folded) = self.fitted(system, &wanted, few, progress)?;
+        let few = match start {
+            Start::Map(_) => FEW_AT_FIRST,
+            Start::Moved { .. } => FEW,
+            Start::Here(_) => 0,
+        };
+        let (free, mut folded) = self.fitted(system, &wanted, few, progress)?;
         let mut found = system.injective(&energy, free.clone());
-        if found.is_none() && folded.len() <= few {
+        if let (None, Start::Here(uv)) = (&found, start) {
+            let by = (&*newton, &energy);
+            match system.approach((&net.mesh, metric), by, (&field.angle, uv), progress)? {
+                Ok(reached) => found = Some(reached),
+                Err(ahead) if ahead.is_empty() => {}
+                Err(ahead) => folded = ahead,
+            }
+        } else if found.is_none() && folded.len() <= few {
             let quarters = net.quarters();
             let triangles = system.triangles(&net.mesh, metric, field, objective)?;
             let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;

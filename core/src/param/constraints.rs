@@ -8,6 +8,7 @@
 use super::ParamError;
 use super::cut::Cut;
 use super::seamless::Relation;
+use crate::field::Step;
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::solve::Constraint;
 use crate::surface::SurfacePoint;
@@ -61,6 +62,20 @@ pub(super) fn seams(mesh: &TriMesh, cut: &Cut) -> Vec<Constraint> {
         out.extend([0, 1].map(|c| Constraint { terms: vec![(w + c, 1.0)], rhs: 0.0 }));
     }
     out
+}
+
+/// Enters the translations of the cuts that follow from the coordinates of the wedges.
+pub(super) fn add_translations(mesh: &TriMesh, cut: &Cut, values: &mut [f64]) {
+    for (k, path) in cut.paths.iter().enumerate() {
+        let sides = |s: &Step| Some((s.left(mesh)?, mesh.next(s.right(mesh)?)));
+        let Some((l, r)) = path.steps.first().and_then(sides) else { continue };
+        let (l, r) = (2 * cut.wedge[l.index()], 2 * cut.wedge[r.index()]);
+        for c in 0..2 {
+            let (component, sign) = turned(-path.jump, c);
+            values[2 * (cut.n_wedges + k) + c as usize] =
+                values[(r + c) as usize] - sign * values[(l + component) as usize];
+        }
+    }
 }
 
 /// The relations as constraints.

@@ -6,11 +6,14 @@
 //! the field and the objective; where they go in the matrix has been worked out with the rest, so that the assembly
 //! is one pass over the triangles and one over the entries (Campen, Quad Layouts, section 6.4).
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::assembly::Scatter;
 use super::constraints;
 use super::cut::Cut;
+use super::injective::NewtonSystem;
 use super::objective::{Local, Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
 use super::unfold::{Effort, OrientationProblem, OrientedTriangle, Unfolded, unfold};
@@ -36,6 +39,11 @@ pub struct SeamlessSystem {
     relations: Vec<Constraint>,
     tied: Tied,
     symbolic: Option<SpdSymbolic>,
+    /// The nodes that the cuts lead to.
+    nodes: Vec<VertexId>,
+    /// What Newton's method needs, once it has been used: what is left of it by the seams alone, and all of it.
+    newton_shares: Option<Arc<Scatter>>,
+    newton: Option<Arc<NewtonSystem>>,
 }
 
 /// What follows from the relations.
@@ -97,11 +105,15 @@ impl SeamlessSystem {
         let shares = Scatter::of_triangles(&cut, &seams);
         let relations = constraints::relations(mesh, &cut, relations)?;
         let tied = Tied::new(&seams, &shares, &relations)?;
-        let jump = field.jump.iter().map(|p| p.rem_euclid(4) as u8).collect();
-        Ok(Self { cut, jump, seams, shares, relations, tied, symbolic: None })
+        let jump = turns(field);
+        let nodes = nodes.to_vec();
+        let (symbolic, newton_shares, newton) = (None, None, None);
+        Ok(Self { cut, jump, seams, shares, relations, tied, symbolic, nodes, newton_shares, newton })
     }
 
-    /// Sets up anew as [`Self::new`] does, but keeps the analysis of the matrix if its pattern is the same.
+    /// Sets up as [`Self::new`] does for another field or other places of the vertices of the same mesh, but keeps what
+    /// does not depend on what has changed: cuts and seams if jumps and nodes are the same, the analysis of a matrix if
+    /// its pattern is.
     ///
     /// # Errors
     ///
@@ -113,6 +125,9 @@ impl SeamlessSystem {
         nodes: &[VertexId],
         relations: &[Relation],
     ) -> Result<(), ParamError> {
+        if mesh.n_faces() == self.cut.turn.len() && nodes == self.nodes && turns(field) == self.jump {
+            return self.set_relations(mesh, relations);
+        }
         let new = Self::new(mesh, field, nodes, relations)?;
         let symbolic = self.symbolic.take().filter(|_| new.tied.same_pattern(&self.tied));
         *self = Self { symbolic, ..new };
@@ -126,10 +141,14 @@ impl SeamlessSystem {
     /// [`ParamError::Malformed`] or [`ParamError::Conflict`]; the system then stays as it was.
     pub fn set_relations(&mut self, mesh: &TriMesh, relations: &[Relation]) -> Result<(), ParamError> {
         let relations = constraints::relations(mesh, &self.cut, relations)?;
+        if relations == self.relations {
+            return Ok(());
+        }
         let tied = Tied::new(&self.seams, &self.shares, &relations)?;
         if !tied.same_pattern(&self.tied) {
             self.symbolic = None;
         }
+        self.newton = None;
         (self.relations, self.tied) = (relations, tied);
         Ok(())
     }
@@ -149,6 +168,42 @@ impl SeamlessSystem {
         self.tied.reduction = self.seams.then(&self.tied.ties);
         self.relations = relations;
         Ok(())
+    }
+
+    /// The differences of all relations.
+    pub(super) fn differences(&self) -> Vec<f64> {
+        self.relations.iter().map(|c| c.rhs).collect()
+    }
+
+    /// What the differences of all relations are where all variables have these values.
+    pub(super) fn differences_at(&self, values: &[f64]) -> Vec<f64> {
+        let at = |c: &Constraint| c.terms.iter().map(|&(x, a)| a * values[x as usize]).sum();
+        self.relations.iter().map(at).collect()
+    }
+
+    /// The values of all variables in a map with the seams of this system.
+    pub(super) fn values_of(&self, mesh: &TriMesh, uv: &[[DVec2; 3]]) -> Vec<f64> {
+        let mut values = vec![0.0; self.seams.n_variables()];
+        for (h, w) in uv.iter().flatten().enumerate() {
+            for axis in 0..2 {
+                let (variable, sign) = constraints::corner(&self.cut, HalfedgeId::new(h), axis);
+                values[variable as usize] = sign * w[axis as usize];
+            }
+        }
+        constraints::add_translations(mesh, &self.cut, &mut values);
+        values
+    }
+
+    /// The free variables where all variables have these values.
+    pub(super) fn free_of(&self, values: &[f64]) -> Vec<f64> {
+        let mut free = vec![0.0; self.n_free()];
+        for (x, &value) in values.iter().enumerate() {
+            // A free variable is expressed by itself alone.
+            if let (&[(y, 1.0)], 0.0) = self.tied.reduction.expression(x) {
+                free[y as usize] = value;
+            }
+        }
+        free
     }
 
     /// The cut surface.
@@ -216,6 +271,21 @@ impl SeamlessSystem {
     /// What the relations leave of what the seams leave.
     pub(super) fn ties(&self) -> &Reduction {
         &self.tied.ties
+    }
+
+    /// What Newton's method needs, if it has been used since the relations changed.
+    pub(super) fn newton_kept(&self) -> Option<Arc<NewtonSystem>> {
+        self.newton.clone()
+    }
+
+    /// How the whole shares of triangles make the matrix of what the seams leave.
+    pub(super) fn whole_shares(&self) -> Arc<Scatter> {
+        self.newton_shares.clone().unwrap_or_else(|| Arc::new(Scatter::of_whole_triangles(&self.cut, &self.seams)))
+    }
+
+    /// Keeps what Newton's method needs until the relations change.
+    pub(super) fn keep_newton(&mut self, newton: &Arc<NewtonSystem>) {
+        (self.newton_shares, self.newton) = (Some(newton.shares()), Some(newton.clone()));
     }
 
     /// The analysis of the pattern of this system's matrices.
@@ -329,6 +399,11 @@ impl SeamlessSystem {
         let uv = (0..self.cut.turn.len()).map(|f| [at(3 * f), at(3 * f + 1), at(3 * f + 2)]).collect();
         SeamlessMap { uv, jump: self.jump.clone() }
     }
+}
+
+/// The period jumps of a field, 0 to 3.
+fn turns(field: &CrossField) -> Vec<u8> {
+    field.jump.iter().map(|p| p.rem_euclid(4) as u8).collect()
 }
 
 impl Tied {

@@ -13,6 +13,8 @@ pub(crate) struct Density {
     determinant: f64,
 }
 
+/// The energy from which on an image is as good as flat: shape cannot be told from rounding any more.
+const FLAT: f64 = 1e14;
 /// Sweeps of the Jacobi method: of 4 by 4 matrices it has converged to rounding after five.
 const SWEEPS: usize = 6;
 
@@ -26,12 +28,12 @@ impl Density {
         [1.0, self.anisotropy, self.anisotropy, 1.0]
     }
 
-    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive.
+    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive beyond rounding.
     pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
         let det = j[0] * j[3] - j[1] * j[2];
         let ratio = det / self.determinant;
         let e = 0.5 * (self.norm(j) / det + self.size * (ratio * ratio + 1.0 / (ratio * ratio)));
-        (det > 0.0 && e.is_finite()).then_some(e)
+        (det > 0.0 && e < FLAT).then_some(e)
     }
 
     /// `jᵀ W j`.

@@ -11,6 +11,10 @@ use crate::param::objective::{Objective, hats};
 /// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
 /// much as twice the area of the triangles beside it.
 const PULL: f64 = 100.0;
+/// Doubled area over squared sides of an image up to which it is flat: what relations force to be flat is not quite so for
+/// rounding. Slivers that arcs leave have a thousand times as much and more.
+const FLAT: f64 = 1e-14;
+
 /// What a map without folds is to be like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
@@ -145,9 +149,12 @@ pub fn gradients(metric: &Metric, angle: &[f64], uv: &[[DVec2; 3]]) -> Vec<[f64;
     uv.iter().enumerate().map(each).collect()
 }
 
-/// The triangles that a map turns over or flattens.
+/// The triangles that a map turns over or flattens but for rounding.
 pub fn folds(uv: &[[DVec2; 3]]) -> Vec<FaceId> {
-    let folded = |w: &[DVec2; 3]| (w[1] - w[0]).perp_dot(w[2] - w[0]) <= 0.0;
+    let folded = |w: &[DVec2; 3]| {
+        let [a, b] = [w[1] - w[0], w[2] - w[0]];
+        a.perp_dot(b) <= FLAT * (a.length_squared() + b.length_squared())
+    };
     uv.iter().enumerate().filter(|(_, w)| folded(w)).map(|(f, _)| FaceId::new(f)).collect()
 }
 

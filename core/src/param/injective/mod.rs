@@ -14,10 +14,13 @@
 //! Sifakis, Irving and Fedkiw, 2005), steps cut short before the first triangle would flatten (Smith and Schaefer,
 //! Bijective Parameterization with Free Boundaries, 2015, section 3.3).
 
+mod approach;
 mod density;
 mod energy;
 #[cfg(test)]
 mod tests;
+
+use std::sync::Arc;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -42,7 +45,8 @@ const SAFE: f64 = 0.8;
 const SUFFICIENT: f64 = 1e-4;
 /// Halvings of a step before it is given up.
 const HALVINGS: usize = 20;
-/// A step that gains less than this share of the energy is the last but for [`PATIENCE`] more.
+/// A step that gains less than this share of the energy is the last if it was a whole one, after which Newton's method has
+/// arrived, and else the last but for [`PATIENCE`] more.
 const GAIN: f64 = 2e-3;
 const PATIENCE: usize = 2;
 /// Area of images, where 1 is usual, below and above whose inverse differences are not weighed by it.
@@ -64,9 +68,30 @@ pub struct Injective {
 /// The Newton systems of one seamless system.
 #[derive(Debug, Clone)]
 pub struct NewtonSystem {
-    shares: Scatter,
+    shares: Arc<Scatter>,
     fold: Scatter,
     symbolic: SpdSymbolic,
+}
+
+impl NewtonSystem {
+    /// How the shares of triangles make the matrix of what the seams leave.
+    pub(super) fn shares(&self) -> Arc<Scatter> {
+        self.shares.clone()
+    }
+
+    /// The Hessian, made positive definite.
+    fn matrix(&self, locals: &[Derivatives]) -> SparseHermitian<f64> {
+        let mut open = self.shares.zero.clone();
+        for (f, local) in locals.iter().enumerate() {
+            self.shares.add(f, &local.hessian, &mut open);
+        }
+        let mut matrix = self.fold.zero.clone();
+        for (k, (_, _, value)) in open.entries().enumerate() {
+            self.fold.add(k, &[value], &mut matrix);
+        }
+        matrix.raise_diagonal(GROUND);
+        matrix
+    }
 }
 
 impl SeamlessSystem {
@@ -104,14 +129,19 @@ impl SeamlessSystem {
     /// # Errors
     ///
     /// [`ParamError::Solve`].
-    pub fn newton(&mut self) -> Result<NewtonSystem, ParamError> {
+    pub fn newton(&mut self) -> Result<Arc<NewtonSystem>, ParamError> {
+        if let Some(kept) = self.newton_kept() {
+            return Ok(kept);
+        }
         let (fit, newton) = rayon::join(|| self.analysed(), || self.newton_system());
         self.keep_analysis(fit?);
-        Ok(newton?)
+        let newton = Arc::new(newton?);
+        self.keep_newton(&newton);
+        Ok(newton)
     }
 
     fn newton_system(&self) -> Result<NewtonSystem, SolveError> {
-        let shares = Scatter::of_whole_triangles(self.cut(), self.seams());
+        let shares = self.whole_shares();
         let fold = Scatter::of_matrix(&shares.zero, self.ties());
         let symbolic = SpdSymbolic::new(&fold.zero)?;
         Ok(NewtonSystem { shares, fold, symbolic })
@@ -151,13 +181,11 @@ impl SeamlessSystem {
             };
             let slope: f64 = direction.iter().zip(&downhill).map(|(a, b)| a * b).sum();
             let before = at.energy;
-            if !self.search(energy, at, &direction, slope) {
-                return Ok(true);
-            }
-            tracing::debug!(step, energy = at.energy, "map without folds");
+            let Some(share) = self.search(energy, at, &direction, slope) else { return Ok(true) };
+            tracing::debug!(step, share, energy = at.energy, "map without folds");
             if before - at.energy < GAIN * at.energy {
                 patience -= 1;
-                if patience == 0 {
+                if patience == 0 || share == 1.0 {
                     return Ok(true);
                 }
             } else {
@@ -167,10 +195,11 @@ impl SeamlessSystem {
         Ok(false)
     }
 
-    /// Goes along a direction as far as it makes the energy less by enough; tells whether it does at all.
-    fn search(&self, energy: &InjectiveEnergy<'_>, at: &mut Injective, direction: &[f64], slope: f64) -> bool {
+    /// Goes along a direction as far as it makes the energy less by enough; tells which share of it that is, if it does
+    /// at all.
+    fn search(&self, energy: &InjectiveEnergy<'_>, at: &mut Injective, direction: &[f64], slope: f64) -> Option<f64> {
         if !(slope > 0.0 && slope.is_finite()) {
-            return false;
+            return None;
         }
         let moved = |t: f64| at.free.iter().zip(direction).map(|(y, d)| y + t * d).collect::<Vec<f64>>();
         let full = self.map(&moved(1.0));
@@ -180,11 +209,11 @@ impl SeamlessSystem {
                 && next.energy <= at.energy - SUFFICIENT * t * slope
             {
                 *at = next;
-                return true;
+                return Some(t);
             }
             t *= 0.5;
         }
-        false
+        None
     }
 
     /// The Hessian, made positive definite, and the direction of steepest descent.
@@ -195,10 +224,13 @@ impl SeamlessSystem {
         uv: &[[DVec2; 3]],
     ) -> (SparseHermitian<f64>, Vec<f64>) {
         let locals: Vec<Derivatives> = uv.par_iter().enumerate().map(|(f, w)| energy.derivatives(f, w)).collect();
-        let mut open = newton.shares.zero.clone();
+        rayon::join(|| newton.matrix(&locals), || self.downhill(&locals))
+    }
+
+    /// The direction of steepest descent.
+    fn downhill(&self, locals: &[Derivatives]) -> Vec<f64> {
         let mut load = vec![0.0; self.seams().n_free()];
         for (f, local) in locals.iter().enumerate() {
-            newton.shares.add(f, &local.hessian, &mut open);
             for (k, share) in local.gradient.iter().enumerate() {
                 let (variable, sign) = constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
                 for &(z, c) in self.seams().expression(variable as usize).0 {
@@ -206,18 +238,13 @@ impl SeamlessSystem {
                 }
             }
         }
-        let mut matrix = newton.fold.zero.clone();
-        for (k, (_, _, value)) in open.entries().enumerate() {
-            newton.fold.add(k, &[value], &mut matrix);
-        }
-        let mut downhill = vec![0.0; matrix.n()];
+        let mut downhill = vec![0.0; self.n_free()];
         for (z, b) in load.into_iter().enumerate() {
             for &(y, c) in self.ties().expression(z).0 {
                 downhill[y as usize] += c * b;
             }
         }
-        matrix.raise_diagonal(GROUND);
-        (matrix, downhill)
+        downhill
     }
 }
 

@@ -5,6 +5,8 @@ use glam::{DVec2, DVec3};
 use super::*;
 use crate::field::{CrossField, cross_field};
 use crate::mesh::{FaceId, TriMesh};
+use crate::param::Relation;
+use crate::surface::SurfacePoint;
 use crate::testing::square;
 
 const SHAPE: Shape = Shape { anisotropy: 4.0, size: 0.2 };
@@ -136,4 +138,36 @@ fn features_are_pulled_towards_isolines() {
     let mut at = system.injective(&energy, at.free).unwrap();
     system.descend(&newton, &energy, &mut at, 60, &Progress::new()).unwrap();
     assert!(off(&at.map) < 1e-3 * gently, "{} {gently}", off(&at.map));
+}
+
+#[test]
+fn relations_are_reached_without_folding_or_what_stands_against_them_is_told() {
+    let (mesh, metric, field) = flat();
+    let uv = mapped(&mesh, |p| p);
+    let face = FaceId(40);
+    let corner = |i: usize| SurfacePoint { face, weights: [0, 1, 2].map(|k| f64::from(u8::from(k == i))) };
+    let alike = |i: usize, axis: u8| Relation {
+        from: corner(i),
+        crossed: Vec::new(),
+        to: corner((i + 1) % 3),
+        axis,
+        difference: 0.0,
+    };
+    let objective = Objective::default();
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
+    let origin = uv[0][0];
+    let uv: Vec<_> = uv.iter().map(|w| w.map(|p| p - origin)).collect();
+    let reached = |relations: &[Relation]| {
+        let mut system = SeamlessSystem::new(&mesh, &field, &[], relations).unwrap();
+        let newton = system.newton().unwrap();
+        let from = (&field.angle[..], &uv[..]);
+        system.approach((&mesh, &metric), (&newton, &energy), from, &Progress::new()).unwrap()
+    };
+    for i in 0..3 {
+        let w = reached(&[alike(i, 0)]).unwrap().map.uv;
+        assert!(folds(&w).is_empty());
+        assert!((w[40][i].x - w[40][(i + 1) % 3].x).abs() < 1e-9);
+    }
+    // A side that is a point flattens its triangle.
+    assert!(reached(&[alike(0, 0), alike(0, 1)]).unwrap_err().contains(&face));
 }

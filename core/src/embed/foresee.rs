@@ -33,7 +33,7 @@ pub struct Foreseen {
 pub fn foresee(job: &Job<'_>, progress: &Progress) -> Result<Foreseen, EmbeddingError> {
     let ready = Optimizer::net(job)?;
     progress.check()?;
-    let optimizer = Optimizer::on(job, ready, (Aim::LeastSquares, Features::Pulled), progress)?
+    let optimizer = Optimizer::on(job, ready, (Aim::LeastSquares, Features::Pulled(1.0)), progress)?
         .map_err(|_| EmbeddingError::Folded)?;
     let State { net, metric, field, solution, .. } = optimizer.state();
     let mesh = &net.mesh;

@@ -206,6 +206,21 @@ fn steps_are_taken_back_and_made_again() {
 }
 
 #[test]
+fn other_strips_are_tried_by_a_script_and_by_the_command_line_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scripted, asked] = ["scripted", "asked"].map(|n| folder.path().join(n));
+    let script = torus_script(folder.path(), &format!(r#"{MERIDIAN}, {EQUATOR}, {{"improve": 3}}"#));
+    let output = plait(&["weave", text(&script), "--no-optimise", "--out", text(&scripted)]);
+    assert!(output.status.success(), "{}", errors(&output));
+    let script = torus_script(folder.path(), &format!("{MERIDIAN}, {EQUATOR}"));
+    let output = plait(&["weave", text(&script), "--improve", "3", "--no-optimise", "--out", text(&asked)]);
+    assert!(output.status.success(), "{}", errors(&output));
+    assert!(errors(&output).contains("the shape"), "{}", errors(&output));
+    let [a, b] = [scripted, asked].map(|f| std::fs::read(f.join("design.plait")).unwrap());
+    assert!(a == b, "the designs differ");
+}
+
+#[test]
 fn a_mistake_in_a_script_is_named_with_its_step() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

@@ -269,6 +269,32 @@ fn escape_undo_and_edits_drop_what_is_being_optimised() {
 }
 
 #[test]
+fn a_layout_is_improved_watched_stopped_and_kept() {
+    let mut window = with_layout();
+    window.get_by_label("Improve the layout").click();
+    // The strips change while it goes on.
+    until(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() > 2));
+    window.get_by_label_contains("patches · before 10.0°, 20");
+    assert!(window.query_by_label("Improve the layout").is_none());
+    window.get_by_label("Stop").click();
+    wait(&mut window, |app| app.is_idle());
+    let strips = window.state().scene().unwrap().strips.len();
+    assert!((3..10).contains(&strips), "{strips}");
+    window.get_by_label_contains("Improved: the layout follows the shape within");
+    window.get_by_label("Improve the layout");
+}
+
+#[test]
+fn escape_drops_an_improvement() {
+    let mut window = with_layout();
+    window.key_press(egui::Key::I);
+    until(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() > 2));
+    window.key_press(egui::Key::Escape);
+    wait(&mut window, |app| app.is_idle() && app.scene().is_some_and(|s| s.strips.len() == 1));
+    window.get_by_label("Improving the layout: cancelled");
+}
+
+#[test]
 fn other_strips_forget_the_optimised_embedding_and_say_so() {
     let mut window = with_layout();
     optimise_and_stop(&mut window);

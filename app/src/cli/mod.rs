@@ -301,6 +301,11 @@ mod tests {
         let Some(Command::Weave(WeaveArguments { detail, .. })) = detail.command else { panic!("not weave") };
         let usual = Options::default();
         assert_eq!(detail.over(usual), Options { proxy: 9000, smoothing: 0.02, ..usual });
+        for (text, rounds) in [("--improve --out x", None), ("--improve 7 --out x", Some(7))] {
+            let weave = parse(&format!("plait weave cube --suggest {text}")).unwrap();
+            let Some(Command::Weave(weave)) = weave.command else { panic!("not weave") };
+            assert_eq!(weave.improve, Some(rounds));
+        }
         let embed = parse("plait embed a.layout --out x --pin-nodes 1,2 --edge-length 0.1 --steps 3").unwrap();
         let Some(Command::Embed(embed)) = embed.command else { panic!("not embed") };
         assert_eq!((embed.pin_nodes, embed.size.edge_length, embed.steps), (vec![1, 2], Some(0.1), Some(3)));

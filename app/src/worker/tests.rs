@@ -201,6 +201,41 @@ fn long_work_is_cancelled_and_what_waited_is_dropped() {
     assert_eq!(error.to_string(), "nothing helps");
 }
 
+#[test]
+fn an_improvement_shows_its_scenes_and_stops_or_goes_back() {
+    let worker = worker();
+    worker.request(Job::Improve);
+    let mut shown = 0;
+    while shown < 3 {
+        let Reply::Refitted { complete: false, improvement, .. } = reply(&worker) else { panic!("not a step") };
+        shown = improvement.changes;
+    }
+    worker.stop();
+    let done = loop {
+        match reply(&worker) {
+            Reply::Refitted { complete: false, .. } => {}
+            Reply::Refitted { improvement, .. } => break improvement,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert!(done.changes >= shown);
+
+    worker.request(Job::Improve);
+    running(&worker, "Improving the layout");
+    worker.cancel();
+    // What was shown on the way is replaced by what there is.
+    let mut back = false;
+    loop {
+        match reply(&worker) {
+            Reply::Refitted { .. } => {}
+            Reply::Changed(_) => back = true,
+            Reply::Failed { error: EngineError::Cancelled, .. } => break,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(back);
+}
+
 /// The first reply after the steps of an optimisation, and how many those were.
 fn after_steps(worker: &Worker) -> (usize, Reply) {
     let mut steps = 0;

@@ -2,6 +2,8 @@
 # Embeds layouts and prints a Markdown table row for each: the drawing beside the optimised embedding.
 #
 #   scripts/embed-table.sh SCRIPT|DESIGN|MESH...   a mesh is woven by suggestions first, until no region is orange
+#   IMPROVE=60 scripts/embed-table.sh …            layouts are improved first, in so many rounds; a mesh is then woven
+#                                                  until no region is red
 #
 # Needs Python for reading the reports.
 set -u
@@ -14,13 +16,20 @@ echo "|---|---|---|---|---|---|---|---|---|---|---|"
 for input in "$@"; do
   name=$(basename "$input")
   design=$input
+  first=()
   case $input in
   *.json | *.plait | *.layout) ;;
-  *)
-    design="$out/w/design.plait"
-    target/debug/plait weave "$input" --suggest --until orange --no-optimise --out "$out/w" >/dev/null 2>&1
-    ;;
+  *) first=(--suggest --until "$([ -n "${IMPROVE:-}" ] && echo red || echo orange)") ;;
   esac
+  if [ -n "${IMPROVE:-}" ]; then first+=(--improve "$IMPROVE"); fi
+  if [ ${#first[@]} -gt 0 ]; then
+    design="$out/w/design.plait"
+    rm -rf "${out:?}/w"
+    start=$(date +%s.%N)
+    target/debug/plait weave "$input" "${first[@]}" --no-optimise --out "$out/w" >/dev/null 2>"$out/woven"
+    seconds=$(echo "$(date +%s.%N) $start" | awk '{printf "%.0f", $1 - $2}')
+    grep -h 'the layout follows' "$out/woven" | sed "s|^plait:|$name, woven in $seconds s:|" >&2
+  fi
   rm -rf "${out:?}/e"
   message=$(timeout "${LIMIT:-600}" target/debug/plait embed "$design" --out "$out/e" --quiet 2>&1)
   if [ -f "$out/e/report.json" ]; then

@@ -1,10 +1,11 @@
 //! Improving a valid layout: other strips, with which patches follow the shape better and are fewer.
 //!
-//! What the guiding field of a layout shows (`super::fit`) is enough to choose between layouts, and is there in a twentieth
-//! of a second. So many are tried. In each round some points are drawn at random from where the layout deviates most from
-//! principal directions, and the loops through these are candidates. Each is tried beside the strips that are there and in
-//! place of some of them; now and then it is tried to leave strips out. The change that lowers the price most is made, and
-//! the next round begins, until nothing was found for a while. Random numbers are the same every time.
+//! What field and map of a layout show where its nodes are drawn (`super::fit`) is enough to choose between layouts, and is
+//! there in a tenth of a second. So many are tried. In each round some points are drawn at random from where the layout
+//! deviates most from principal directions, and the loops through these are candidates. Each is tried beside the strips that
+//! are there and in place of some of them; now and then it is tried to leave strips out. The change that lowers the price
+//! most is made, if it still does after some steps of the nodes, and the next round begins, until nothing was found for a
+//! while. Random numbers are the same every time.
 //!
 //! What matters does not depend on triangles much smaller than patches: a mesh of many triangles is improved on a
 //! proxy. A change is made only if the strips make the same layout on the mesh that the session weaves on.
@@ -44,8 +45,10 @@ const SWAPS: usize = 3;
 const SPARING: usize = 4;
 /// By how much a change has to lower the price, in degrees.
 const LEAST_GAIN: f64 = 1e-3;
-/// Changes of a round that are tried on the mesh of the session, the best first.
-const CARRIED: usize = 4;
+/// Changes of a round that are looked into, the best first.
+const LOOKED_INTO: usize = 4;
+/// Steps of the nodes after which a layout is judged that is to be taken.
+const STEPS: usize = 4;
 /// Radius of the tube in which a strip is smoothed that was carried from a proxy, in mean edges: the proxy's are longer.
 const TUBE: f64 = 5.0;
 
@@ -72,6 +75,8 @@ struct Better {
     change: Change,
     fit: Fit,
     shares: Vec<f64>,
+    /// The price before the nodes move.
+    drawn: f64,
 }
 
 impl Session {
@@ -116,8 +121,9 @@ impl Session {
             let changes = trial.changes(round, candidates.len());
             let better = trial.better(&changes, &candidates, progress)?;
             let mut made = None;
-            for better in better.into_iter().take(CARRIED) {
-                if let Some(strips) = self.changed(trial, better.change, &candidates, progress)? {
+            for (change, price) in better.into_iter().take(LOOKED_INTO) {
+                let Some(better) = trial.looked_into(change, price, &candidates, progress)? else { continue };
+                if let Some(strips) = self.changed(trial, change, &candidates, progress)? {
                     made = Some((better, strips));
                     break;
                 }
@@ -220,6 +226,8 @@ struct Trial {
     /// The strips, in the order of those of the session.
     curves: Vec<SurfaceCurve>,
     fit: Fit,
+    /// The price before the nodes move.
+    drawn: f64,
     /// What each triangle adds to the deviation.
     shares: Vec<f64>,
     random: Random,
@@ -229,8 +237,10 @@ impl Trial {
     fn new(session: &Session, progress: &Progress) -> Result<Self, WeaveError> {
         let model = Arc::clone(session.model());
         let curves: Vec<SurfaceCurve> = session.design().strips.iter().map(|s| s.woven().clone()).collect();
-        let (fit, shares) = fit(&model, &curves.iter().collect::<Vec<_>>(), progress)?;
-        Ok(Self { model, curves, fit, shares, random: Random(1) })
+        let all: Vec<&SurfaceCurve> = curves.iter().collect();
+        let drawn = fit(&model, &all, 0, progress)?.0.price;
+        let (fit, shares) = fit(&model, &all, STEPS, progress)?;
+        Ok(Self { model, curves, fit, drawn, shares, random: Random(1) })
     }
 
     /// Loops through points where the layout deviates from principal directions, smoothed.
@@ -273,27 +283,41 @@ impl Trial {
         list
     }
 
-    /// The changes that make the layout better, the best first.
+    /// The changes that lower the price before the nodes move, and what it is then; the best first.
     fn better(
         &self,
         changes: &[Change],
         candidates: &[Proposal],
         progress: &Progress,
-    ) -> Result<Vec<Better>, Cancelled> {
-        let tried: Vec<Option<Better>> = changes
+    ) -> Result<Vec<(Change, f64)>, Cancelled> {
+        let prices: Vec<Option<f64>> = changes
             .par_iter()
             .map(|&change| {
                 progress.check()?;
                 // What makes no layout, or one that cannot be drawn, is no improvement.
-                let found = fit(&self.model, &self.with(change, candidates), progress).ok();
-                let found = found.filter(|(fit, _)| fit.price < self.fit.price - LEAST_GAIN);
-                Ok(found.map(|(fit, shares)| Better { change, fit, shares }))
+                let found = fit(&self.model, &self.with(change, candidates), 0, progress).ok();
+                Ok(found.map(|(fit, _)| fit.price).filter(|price| *price < self.drawn - LEAST_GAIN))
             })
             .collect::<Result<_, Cancelled>>()?;
         progress.check()?;
-        let mut better: Vec<Better> = tried.into_iter().flatten().collect();
-        better.sort_by(|a, b| a.fit.price.total_cmp(&b.fit.price));
+        let pairs = changes.iter().zip(prices);
+        let mut better: Vec<(Change, f64)> = pairs.filter_map(|(change, price)| Some((*change, price?))).collect();
+        better.sort_by(|a, b| a.1.total_cmp(&b.1));
         Ok(better)
+    }
+
+    /// A change of such a price before the nodes move, if it lowers that after they have, too.
+    fn looked_into(
+        &self,
+        change: Change,
+        drawn: f64,
+        candidates: &[Proposal],
+        progress: &Progress,
+    ) -> Result<Option<Better>, Cancelled> {
+        let found = fit(&self.model, &self.with(change, candidates), STEPS, progress).ok();
+        progress.check()?;
+        let found = found.filter(|(fit, _)| fit.price < self.fit.price - LEAST_GAIN);
+        Ok(found.map(|(fit, shares)| Better { change, fit, shares, drawn }))
     }
 
     /// The strips after a change.
@@ -305,7 +329,7 @@ impl Trial {
 
     fn make(&mut self, better: Better, candidates: &[Proposal]) {
         self.curves = self.with(better.change, candidates).into_iter().cloned().collect();
-        (self.fit, self.shares) = (better.fit, better.shares);
+        (self.fit, self.drawn, self.shares) = (better.fit, better.drawn, better.shares);
     }
 }
 

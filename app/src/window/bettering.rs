@@ -40,7 +40,7 @@ pub fn in_progress(running: &Running, so_far: Option<String>, ui: &mut Ui, actio
     ui.label(if stage.is_empty() { &running.label } else { stage });
     ui.add(egui::ProgressBar::new(fraction as f32).desired_height(6.0).fill(theme::ACCENT));
     let can_stop = so_far.is_some() && !stopping;
-    ui.label(RichText::new(so_far.unwrap_or_default()).color(theme::QUIET));
+    ui.label(RichText::new(so_far.unwrap_or_else(|| "Nothing better yet".into())).color(theme::QUIET));
     ui.horizontal(|ui| {
         let stop = egui::Button::new("Stop").min_size(vec2(0.5 * (ui.available_width() - 8.0), 32.0));
         if ui.add_enabled(can_stop, stop).on_hover_text("Keeps the best so far").clicked() {

@@ -405,7 +405,7 @@ fn status(app: &PlaitApp, ui: &mut Ui) {
     let hint = if app.scene.is_none() {
         "Drop a mesh on the window, or open one with Ctrl+O"
     } else if app.is_bettering() {
-        "Stop keeps the best embedding so far · Escape drops it · Drag: orbit"
+        "Stop keeps the best so far · Escape drops it · Drag: orbit"
     } else if app.input.is_dragging() {
         "Left or middle drag: orbit · Right drag: pan"
     } else if let Some(part) = app.hover.part {

@@ -10,6 +10,9 @@ use crate::mesh::VertexId;
 /// How many places before the one computed the first allowed turn is looked for: rounding moves it by one at most.
 const NEARLY: usize = 2;
 
+/// States whose steps are priced at once.
+const PART: usize = 4096;
+
 /// The states that may follow a state: a range around its end, which may be wrapped.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Window {
@@ -35,10 +38,28 @@ impl ElasticaGraph {
             window.prices = count;
             count = count.checked_add(u32::from(window.count)).ok_or(ElasticaError::TooLarge)?;
         }
-        let graph = &*self;
-        let states = (0..graph.n_states() as State).into_par_iter();
-        self.prices = states.flat_map_iter(|e| graph.successors(e).map(move |f| graph.step(e, f))).collect();
+        self.prices = self.step_prices(count as usize);
         Ok(())
+    }
+
+    /// The prices of all steps, of which there are so many, written where they stay: collected from parts they would take
+    /// twice the memory.
+    fn step_prices(&self, count: usize) -> Vec<f32> {
+        let mut prices = vec![0.0; count];
+        let mut parts = Vec::new();
+        let mut rest = &mut prices[..];
+        for first in (0..self.n_states()).step_by(PART) {
+            let states = first..(first + PART).min(self.n_states());
+            let steps = self.window[states.clone()].iter().map(|w| usize::from(w.count)).sum();
+            let (part, after) = rest.split_at_mut(steps);
+            parts.push((states, part));
+            rest = after;
+        }
+        parts.into_par_iter().for_each(|(states, part)| {
+            let steps = states.flat_map(|e| self.successors(e as State).map(move |f| (e as State, f)));
+            part.iter_mut().zip(steps).for_each(|(price, (e, f))| *price = self.step(e, f));
+        });
+        prices
     }
 
     fn find_window(&self, e: State) -> Window {

@@ -24,11 +24,13 @@ pub fn improved(i: &Improvement) -> String {
     }
     let patches = |n: usize| format!("{n} {}", if n == 1 { "patch" } else { "patches" });
     format!(
-        "the layout follows the shape within {:.1}° in {}, before within {:.1}° in {}",
+        "the layout follows the shape within {:.1}° in {}, before within {:.1}° in {} (misfit {:.1}, before {:.1})",
         i.after.alignment,
         patches(i.after.patches),
         i.before.alignment,
         patches(i.before.patches),
+        i.after.price,
+        i.before.price,
     )
 }
 

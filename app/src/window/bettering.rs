@@ -14,8 +14,8 @@ pub fn strips(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
         let so_far = app.improvement.map(|i| {
             let (now, before) = (i.after, i.before);
             format!(
-                "{:.1}° off, {} patches · before {:.1}°, {}",
-                now.alignment, now.patches, before.alignment, before.patches
+                "Misfit {:.1}, before {:.1}\n{:.1}° off, {} patches · before {:.1}°, {}",
+                now.price, before.price, now.alignment, now.patches, before.alignment, before.patches
             )
         });
         ui.add_space(4.0);

@@ -181,7 +181,7 @@ impl Session {
         let smooth = [true, false].into_iter().filter_map(|smooth| self.carried(trial, candidate, smooth, progress));
         for strip in smooth {
             progress.check()?;
-            if Arc::ptr_eq(&trial.model, self.model()) || self.is_like(trial, &wanted, strips.iter().chain([&strip]))? {
+            if Arc::ptr_eq(&trial.model, self.model()) || self.is_like(trial, &wanted, strips.iter().chain([&strip])) {
                 strips.push(strip);
                 return Ok(Some(strips));
             }
@@ -190,15 +190,11 @@ impl Session {
     }
 
     /// Whether strips make the same of the mesh that the session weaves on as curves of that of the trial.
-    fn is_like<'s>(
-        &self,
-        trial: &Trial,
-        curves: &[&SurfaceCurve],
-        strips: impl Iterator<Item = &'s Strip>,
-    ) -> Result<bool, WeaveError> {
-        let here = Arrangement::sketch(&self.model().mesh, strips.map(Strip::woven))?;
-        let there = Arrangement::sketch(&trial.model.mesh, curves.iter().copied())?;
-        Ok(alike(&here, &there))
+    fn is_like<'s>(&self, trial: &Trial, curves: &[&SurfaceCurve], strips: impl Iterator<Item = &'s Strip>) -> bool {
+        let here = Arrangement::sketch(&self.model().mesh, strips.map(Strip::woven));
+        let there = Arrangement::sketch(&trial.model.mesh, curves.iter().copied());
+        // What cannot be arranged is like nothing: the change is not made, and what was found before stays.
+        here.ok().zip(there.ok()).is_some_and(|(here, there)| alike(&here, &there))
     }
 
     /// A candidate as a strip of this session, smoothed on its mesh if it comes from another and that is asked for.

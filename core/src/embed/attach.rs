@@ -137,7 +137,7 @@ impl Optimizer<'_> {
             return Ok(0);
         }
         let brought = |this: &Self, _: &[u32], stays: &[bool]| this.brought(&places, stays);
-        let (found, _) = self.as_far_as_possible(brought, progress)?;
+        let (found, _) = self.as_far_as_possible(brought, vec![false; self.pace.len()], progress)?;
         let Some(state) = found else {
             self.synchronise(progress)?;
             return Ok(0);

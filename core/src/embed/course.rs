@@ -87,7 +87,18 @@ impl<'w> Course<'w> {
     ) -> Result<Embedded, EmbeddingError> {
         let flipped_at_rest = optimizer.state().flipped();
         if optimizer.is_hopeless() && !job.layout.patches.is_empty() && job.settings.integer.is_none() {
-            let mut done = self.unfolded(job, Err(EmbeddingError::Folded), progress)?;
+            let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
+            let mut done = match self.without_folds(job, start, progress) {
+                Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(error) => {
+                    tracing::debug!(%error, "not from a map with many folds: from the drawing");
+                    self.unfolded(job, Err(error), progress)?
+                }
+                Ok(mut done) => {
+                    self.enter(&mut done.report);
+                    done
+                }
+            };
             done.report.flipped_at_rest = flipped_at_rest;
             return Ok(done);
         }

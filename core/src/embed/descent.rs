@@ -17,7 +17,7 @@ use super::spacing::{Spacing, lengths};
 use super::state::State;
 use super::straight::{ArcEnd, Crossroads};
 use crate::field::{GuidedSystem, Metric};
-use crate::mesh::VertexId;
+use crate::mesh::{FaceId, VertexId};
 use crate::param::{SeamlessSystem, Shape, gradients};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
@@ -273,37 +273,63 @@ impl<'a> Optimizer<'a> {
         Ok(better)
     }
 
-    /// Field and map with all nodes moved that can without folding the map; `None` if too few can.
+    /// Field and map with all nodes moved that can without folding the map; `None` if too few can. Where that makes the
+    /// energy more, the nodes stay around which it does.
     fn next(&mut self, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
-        let (next, stays) = self.as_far_as_possible(Self::moved, progress)?;
+        let none = vec![false; self.pace.len()];
+        let (mut next, mut stays) = self.as_far_as_possible(Self::moved, none, progress)?;
+        // Least squares only lead to where maps without folds begin: there it was no better for it.
+        let dearer = next.as_ref().filter(|n| self.shape.is_some() && n.solution.energy >= self.state.solution.energy);
+        if let Some(dearer) = dearer.map(|n| self.dearer(n)) {
+            let with: Vec<bool> = stays.iter().zip(&dearer).map(|(a, b)| *a || *b).collect();
+            let moving = with.iter().filter(|&&s| !s).count();
+            if with != stays && moving > 0 {
+                tracing::debug!(moving, "nodes stay where the energy would be more");
+                (next, stays) = self.as_far_as_possible(Self::moved, with, progress)?;
+            }
+        }
         for (pace, _) in self.pace.iter_mut().zip(stays).filter(|(_, stays)| *stays) {
             *pace *= 0.5;
         }
         Ok(next)
     }
 
-    /// Field and map of a net with nodes moved, of which those stay in whose cells the map would fold: the net is asked
-    /// for with the cells and for each node whether it stays. `None` if too few can move.
+    /// For each node whether the energy around it is more than it was.
+    fn dearer(&self, next: &State) -> Vec<bool> {
+        let cell = self.cells();
+        let (before, after) = (self.state.energies(self.shape), next.energies(self.shape));
+        let mut change = vec![0.0; self.pace.len()];
+        for (f, d) in before.iter().zip(&after).map(|(a, b)| b - a).enumerate() {
+            for v in self.state.net.mesh.face_vertices(FaceId::new(f)) {
+                change.get_mut(cell[v.index()] as usize).into_iter().for_each(|c| *c += d / 3.0);
+            }
+        }
+        change.iter().map(|&c| c > 0.0).collect()
+    }
+
+    /// Field and map of a net with nodes moved but for those that stay and those in whose cells the map would fold: the net
+    /// is asked for with the cells and for each node whether it stays. `None` if too few can move.
     pub(super) fn as_far_as_possible(
         &mut self,
         moved: impl Fn(&Self, &[u32], &[bool]) -> Net,
+        mut stays: Vec<bool>,
         progress: &Progress,
     ) -> Result<(Option<State>, Vec<bool>), EmbeddingError> {
         let cell = self.cells();
-        let mut stays = vec![false; self.pace.len()];
+        let count = |stays: &[bool]| stays.iter().filter(|&&s| s).count();
+        let most = count(&stays).max(stays.len() / 2);
         loop {
             let net = moved(self, &cell, &stays);
             let folded = match self.attempt(net, progress)? {
                 Ok(next) => return Ok((Some(next), stays)),
                 Err(Folded(list)) => list,
             };
-            let count = |stays: &[bool]| stays.iter().filter(|&&s| s).count();
             let before = count(&stays);
             for v in folded.iter().flat_map(|&f| self.state.net.mesh.face_vertices(f)) {
                 stays.get_mut(cell[v.index()] as usize).into_iter().for_each(|s| *s = true);
             }
             let after = count(&stays);
-            if after == before || 2 * after > stays.len() {
+            if after == before || after > most {
                 return Ok((None, stays));
             }
             tracing::debug!(nodes = after, "nodes stay where the map would fold");

@@ -81,7 +81,10 @@ impl Optimizer<'_> {
     fn settle(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         for _ in 0..SETTLING {
             let before = self.state.solution.energy;
-            let (Some(state), _) = self.as_far_as_possible(Self::settled, progress)? else { break };
+            let (Some(state), _) = self.as_far_as_possible(Self::settled, vec![false; self.pace.len()], progress)?
+            else {
+                break;
+            };
             self.state = state;
             if (self.state.solution.energy - before).abs() < SETTLED * before {
                 break;

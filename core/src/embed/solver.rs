@@ -305,7 +305,12 @@ impl Setting<'_> {
             let triangles = system.triangles(&net.mesh, metric, field, objective)?;
             let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
             tracing::debug!(folds = folded.len(), left = unfolded.folds.len(), "folds of the first guess");
-            found = system.injective(&energy, unfolded.y);
+            found = system.injective(&energy, unfolded.y.clone());
+            // Of a step there are others; of a first map there is only one that is much worse.
+            if found.is_none() && matches!(start, Start::Map(_)) {
+                let whole = (&net.mesh, &quarters[..]);
+                found = system.untangle(&newton, &energy, unfolded.y, whole, progress)?;
+            }
         }
         let Some(mut at) = found else {
             tracing::debug!(folds = folded.len(), "the first guess folds");

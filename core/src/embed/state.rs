@@ -7,7 +7,7 @@ use super::net::{Net, NetArc};
 use super::trace::{ArcChain, preview_arcs};
 use crate::field::{CrossField, Metric};
 use crate::mesh::{EdgeId, VertexId};
-use crate::param::{Objective, Residual, Solution, residuals};
+use crate::param::{InjectiveEnergy, Objective, Residual, Shape, Solution, residuals};
 
 /// Field and map for nodes at certain places.
 #[derive(Debug, Clone)]
@@ -53,6 +53,17 @@ impl State {
     pub(super) fn least_squares(&self) -> f64 {
         let each = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
         each.iter().map(|r| r.energy).sum()
+    }
+
+    /// The energy of each triangle of the map: that of maps without folds of a shape, or that of least squares.
+    pub(super) fn energies(&self, shape: Option<Shape>) -> Vec<f64> {
+        let Self { metric, field, objective, firmness, solution, .. } = self;
+        match shape {
+            Some(shape) => {
+                InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).of_each(&solution.map.uv)
+            }
+            None => residuals(metric, &field.angle, &solution.map.uv, objective).iter().map(|r| r.energy).collect(),
+        }
     }
 
     /// Which of the edges that are `sharp` lie on isolines.

@@ -11,6 +11,31 @@ pub(crate) struct Density {
     size: f64,
     /// The determinant wanted, `m`.
     determinant: f64,
+    /// `ε`: how far below zero, in multiples of that, determinants still have an energy worth making less; 0: none has.
+    slack: f64,
+}
+
+/// A function of the determinant with its first and second derivative.
+#[derive(Debug, Clone, Copy)]
+struct Jet([f64; 3]);
+
+impl Jet {
+    /// `1 / f`.
+    fn inverse(self) -> Self {
+        let [f, d, e] = self.0;
+        Self([1.0 / f, -d / (f * f), (2.0 * d * d / f - e) / (f * f)])
+    }
+
+    /// `f²`.
+    fn squared(self) -> Self {
+        let [f, d, e] = self.0;
+        Self([f * f, 2.0 * f * d, 2.0 * (d * d + f * e)])
+    }
+
+    /// `a f + b g`.
+    fn sum(self, a: f64, other: Self, b: f64) -> Self {
+        Self(std::array::from_fn(|k| a * self.0[k] + b * other.0[k]))
+    }
 }
 
 /// The energy from which on an image is as good as flat: shape cannot be told from rounding any more.
@@ -21,19 +46,49 @@ const SWEEPS: usize = 6;
 impl Density {
     /// The energy of a triangle in which the gradients are to have the lengths given.
     pub(crate) fn new(shape: Shape, [a, b]: [f64; 2]) -> Self {
-        Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b }
+        Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b, slack: 0.0 }
+    }
+
+    /// The same with `ε`: triangles that are turned over have a finite energy, the greater the less `ε` is.
+    pub(super) fn with_slack(self, slack: f64) -> Self {
+        Self { slack, ..self }
     }
 
     fn weights(&self) -> [f64; 4] {
         [1.0, self.anisotropy, self.anisotropy, 1.0]
     }
 
-    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive beyond rounding.
+    /// What stands for a determinant: itself, or with slack `½ (D + √(ε² m² + D²))`, which is positive whatever `D` is.
+    fn positive(&self, det: f64) -> Jet {
+        if self.slack == 0.0 {
+            return Jet([det, 1.0, 0.0]);
+        }
+        let least = self.slack * self.determinant;
+        let root = least.hypot(det);
+        // Of a negative determinant the sum would lose all digits.
+        let value = if det > 0.0 { 0.5 * (det + root) } else { 0.5 * least * least / (root - det) };
+        Jet([value, value / root, 0.5 * least * least / root.powi(3)])
+    }
+
+    /// `1 / D`, by which shape is multiplied, and what size costs, `λ (D²/m² + m²/D²)`.
+    fn parts(&self, det: f64) -> (Jet, Jet) {
+        let inverse = self.positive(det).inverse();
+        let square = self.determinant * self.determinant;
+        (inverse, Jet([det, 1.0, 0.0]).squared().sum(self.size / square, inverse.squared(), self.size * square))
+    }
+
+    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive beyond rounding or
+    /// there is slack.
     pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
         let det = j[0] * j[3] - j[1] * j[2];
-        let ratio = det / self.determinant;
-        let e = 0.5 * (self.norm(j) / det + self.size * (ratio * ratio + 1.0 / (ratio * ratio)));
-        (det > 0.0 && e < FLAT).then_some(e)
+        let (inverse, size) = self.parts(det);
+        let e = 0.5 * (self.norm(j) * inverse.0[0] + size.0[0]);
+        ((det > 0.0 || self.slack > 0.0) && e < FLAT).then_some(e)
+    }
+
+    /// The determinant of a matrix in multiples of that wanted.
+    pub(super) fn determinant(&self, j: &[f64; 4]) -> f64 {
+        (j[0] * j[3] - j[1] * j[2]) / self.determinant
     }
 
     /// `jᵀ W j`.
@@ -41,7 +96,7 @@ impl Density {
         self.weights().iter().zip(j).map(|(w, x)| w * x * x).sum()
     }
 
-    /// The derivatives of the energy by the entries of the matrix; of a matrix with positive determinant.
+    /// The derivatives of the energy by the entries of the matrix; of one with positive determinant, or with slack.
     pub(crate) fn gradient(&self, j: &[f64; 4]) -> [f64; 4] {
         self.derivatives(j).0
     }
@@ -51,20 +106,19 @@ impl Density {
         let det = j[0] * j[3] - j[1] * j[2];
         let turned = [j[3], -j[2], -j[1], j[0]];
         let weights = self.weights();
-        let (norm, m) = (self.norm(j), self.determinant);
-        // e = ½ (N/D + λ (D²/m² + m²/D²)): first and second derivatives with respect to D.
-        let (square, ratio) = (det * det, m * m / (det * det));
-        let first = -0.5 * norm / square + self.size * (1.0 / ratio - ratio) / det;
-        let second = norm / (square * det) + self.size * (1.0 / ratio + 3.0 * ratio) / square;
+        // e = ½ (N g(D) + h(D)): first and second derivatives with respect to D.
+        let (shape, size) = self.parts(det);
+        let Jet([_, first, second]) = shape.sum(0.5 * self.norm(j), size, 0.5);
+        let [factor, slope, _] = shape.0;
         let mut gradient = [0.0; 4];
         let mut hessian = [[0.0; 4]; 4];
         for r in 0..4 {
             let pull = weights[r] * j[r];
-            gradient[r] = pull / det + first * turned[r];
-            hessian[r][r] += weights[r] / det;
+            gradient[r] = pull * factor + first * turned[r];
+            hessian[r][r] += weights[r] * factor;
             for c in 0..4 {
                 hessian[r][c] += second * turned[r] * turned[c];
-                hessian[r][c] -= (pull * turned[c] + turned[r] * weights[c] * j[c]) / (det * det);
+                hessian[r][c] += slope * (pull * turned[c] + turned[r] * weights[c] * j[c]);
             }
         }
         for (r, sign) in [1.0, -1.0, -1.0, 1.0].into_iter().enumerate() {
@@ -146,20 +200,22 @@ fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
 mod tests {
     use super::*;
 
-    const DENSITY: Density = Density { anisotropy: 3.0, size: 0.4, determinant: 2.0 };
+    const DENSITY: Density = Density { anisotropy: 3.0, size: 0.4, determinant: 2.0, slack: 0.0 };
 
     #[test]
     fn the_gradient_is_that_of_the_energy() {
-        let at = [1.1, 0.3, -0.4, 0.9];
-        let (gradient, _) = DENSITY.derivatives(&at);
-        for k in 0..4 {
-            let moved = |d: f64| {
-                let mut j = at;
-                j[k] += d;
-                DENSITY.value(&j).unwrap()
-            };
-            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!((slope - gradient[k]).abs() < 1e-8, "{k}: {slope} {}", gradient[k]);
+        let folded = [1.1, 0.3, 2.4, -0.9];
+        for (density, at) in [(DENSITY, [1.1, 0.3, -0.4, 0.9]), (DENSITY.with_slack(0.3), folded)] {
+            let (gradient, _) = density.derivatives(&at);
+            for k in 0..4 {
+                let moved = |d: f64| {
+                    let mut j = at;
+                    j[k] += d;
+                    density.value(&j).unwrap()
+                };
+                let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((slope - gradient[k]).abs() < 1e-6 * slope.abs().max(1.0), "{k}: {slope} {}", gradient[k]);
+            }
         }
     }
 
@@ -167,17 +223,19 @@ mod tests {
     fn the_hessian_is_that_of_the_energy_where_it_is_convex() {
         // At the best matrix conceivable nothing is cut off.
         let at = [2f64.sqrt(), 0.0, 0.0, 2f64.sqrt()];
-        let (_, hessian) = DENSITY.derivatives(&at);
-        for c in 0..4 {
-            let moved = |d: f64| {
-                let mut j = at;
-                j[c] += d;
-                DENSITY.derivatives(&j).0
-            };
-            let (up, down) = (moved(1e-5), moved(-1e-5));
-            for (r, row) in hessian.iter().enumerate() {
-                let slope = (up[r] - down[r]) / 2e-5;
-                assert!((slope - row[c]).abs() < 1e-8, "{r} {c}: {slope} {}", row[c]);
+        for density in [DENSITY, DENSITY.with_slack(0.1)] {
+            let (_, hessian) = density.derivatives(&at);
+            for c in 0..4 {
+                let moved = |d: f64| {
+                    let mut j = at;
+                    j[c] += d;
+                    density.derivatives(&j).0
+                };
+                let (up, down) = (moved(1e-5), moved(-1e-5));
+                for (r, row) in hessian.iter().enumerate() {
+                    let slope = (up[r] - down[r]) / 2e-5;
+                    assert!((slope - row[c]).abs() < 1e-8, "{r} {c}: {slope} {}", row[c]);
+                }
             }
         }
     }

@@ -58,6 +58,8 @@ pub struct InjectiveEnergy<'a> {
     /// For each side of each triangle the coordinate that it is pulled towards an isoline of, and how strongly; empty:
     /// none.
     pulled: Vec<[Option<(u8, f64)>; 3]>,
+    /// For each triangle how far its determinant may be below zero, see [`Density`]; empty: nowhere.
+    slack: Vec<f64>,
 }
 
 impl<'a> InjectiveEnergy<'a> {
@@ -69,7 +71,7 @@ impl<'a> InjectiveEnergy<'a> {
         objective: &'a Objective,
         (shape, firmness): (Shape, &'a [f64]),
     ) -> Self {
-        Self { metric, angle, objective, shape, firmness, pulled: Vec::new() }
+        Self { metric, angle, objective, shape, firmness, pulled: Vec::new(), slack: Vec::new() }
     }
 
     /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v), each so many times as strongly
@@ -82,6 +84,11 @@ impl<'a> InjectiveEnergy<'a> {
             self.pulled[h.index() / 3][h.index() % 3] = Some((axis, strength * PULL));
         }
         self
+    }
+
+    /// The same with a finite energy of triangles that are turned over by as much as given; see [`super::untangle`].
+    pub(super) fn with_slack(&self, slack: Vec<f64>) -> Self {
+        Self { slack, ..self.clone() }
     }
 
     /// The sides of a triangle that are pulled.
@@ -101,18 +108,30 @@ impl<'a> InjectiveEnergy<'a> {
     fn density(&self, f: usize) -> Density {
         let share = self.firmness.get(f).copied().unwrap_or(1.0);
         Density::new(self.shape.at_firmness(share), self.objective.target(FaceId::new(f)))
+            .with_slack(self.slack.get(f).copied().unwrap_or(0.0))
     }
 
     /// The energy of a map; `None` where a triangle is turned over or flat.
     pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
+        // Added up in order: the sum must not depend on threads.
+        let total: f64 = self.of_each(uv).into_iter().sum();
+        total.is_finite().then_some(total)
+    }
+
+    /// The energy of each triangle of a map, infinite where it is turned over or flat.
+    pub fn of_each(&self, uv: &[[DVec2; 3]]) -> Vec<f64> {
         let each = |(f, w): (usize, &[DVec2; 3])| {
             let area = self.metric.area(FaceId::new(f));
             let pull: f64 = self.pulls(f, w).map(|p| p.strength * p.off * p.off).sum();
-            Some(area * self.density(f).value(&matrix(&self.hats(f), w))? + pull)
+            area * self.density(f).value(&matrix(&self.hats(f), w)).unwrap_or(f64::INFINITY) + pull
         };
-        // Added up in order: the sum must not depend on threads.
-        let parts: Vec<Option<f64>> = uv.par_iter().enumerate().map(each).collect();
-        parts.into_iter().sum()
+        uv.par_iter().enumerate().map(each).collect()
+    }
+
+    /// The determinants of a map, in multiples of those wanted.
+    pub(super) fn determinants(&self, uv: &[[DVec2; 3]]) -> Vec<f64> {
+        let each = |(f, w): (usize, &[DVec2; 3])| self.density(f).determinant(&matrix(&self.hats(f), w));
+        uv.par_iter().enumerate().map(each).collect()
     }
 
     pub(super) fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> Derivatives {

@@ -19,6 +19,7 @@ mod density;
 mod energy;
 #[cfg(test)]
 mod tests;
+mod untangle;
 
 use std::sync::Arc;
 
@@ -195,8 +196,8 @@ impl SeamlessSystem {
         Ok(false)
     }
 
-    /// Goes along a direction as far as it makes the energy less by enough; tells which share of it that is, if it does
-    /// at all.
+    /// Goes along a direction as far as it makes the energy less by enough and nothing folds; tells which share of it that
+    /// is, if it does at all.
     fn search(&self, energy: &InjectiveEnergy<'_>, at: &mut Injective, direction: &[f64], slope: f64) -> Option<f64> {
         if !(slope > 0.0 && slope.is_finite()) {
             return None;
@@ -248,15 +249,15 @@ impl SeamlessSystem {
     }
 }
 
-/// The first time at which a triangle becomes flat when all corners go from one map to another at constant speed.
+/// The first time at which a triangle that is not turned over becomes flat when all corners go from one map to another at constant speed.
 fn first_flat(from: &[[DVec2; 3]], to: &[[DVec2; 3]]) -> f64 {
     let flat = |(p, q): (&[DVec2; 3], &[DVec2; 3])| {
         let [e, g] = [p[1] - p[0], p[2] - p[0]];
         let [de, dg] = [q[1] - q[0] - e, q[2] - q[0] - g];
-        // det(t) = a t² + b t + c with c > 0: its first positive root, in the form that loses no digits.
+        // det(t) = a t² + b t + c: where c > 0 its first positive root, in the form that loses no digits.
         let (a, b, c) = (de.perp_dot(dg), e.perp_dot(dg) + de.perp_dot(g), e.perp_dot(g));
         let root = b * b - 4.0 * a * c;
-        if root < 0.0 {
+        if root < 0.0 || c <= 0.0 {
             return f64::INFINITY;
         }
         let t = 2.0 * c / (-b + root.sqrt());

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::*;
 use crate::field::{CrossField, cross_field};
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::param::Relation;
 use crate::surface::SurfacePoint;
 use crate::testing::square;
@@ -85,6 +85,31 @@ fn a_map_that_folds_has_no_energy() {
     assert_eq!(energy.of(&uv), None);
     // All variables alike: every triangle is a point.
     assert!(system.injective(&energy, vec![0.0; system.n_free()]).is_none());
+}
+
+#[test]
+fn a_map_with_folds_is_untangled_and_satisfies_all_that_it_did() {
+    let (mesh, metric, field) = flat();
+    // Between the sides the square is pulled across itself.
+    let tangled = |p: DVec2| p + 0.5 * DVec2::X * (-40.0 * (p - 0.4).length_squared()).exp();
+    let (mut system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, tangled));
+    let objective = Objective::default();
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
+    assert!(folds(&system.map(&free).uv).len() > 5);
+    assert!(system.injective(&energy, free.clone()).is_none());
+    let newton = system.newton().unwrap();
+    let border = |v: VertexId| mesh.is_boundary_vertex(v);
+    let quarters: Vec<u32> = mesh.vertices().map(|v| if border(v) { 0 } else { 4 }).collect();
+    let around = |quarters: &[u32]| {
+        system.untangle(&newton, &energy, free.clone(), (&mesh, quarters), &Progress::new()).unwrap()
+    };
+    let found = around(&quarters).unwrap();
+    assert!(folds(&found.map.uv).is_empty());
+    assert_eq!(found.energy, energy.of(&found.map.uv).unwrap());
+    assert_eq!(found.map.uv, system.map(&found.free).uv);
+    // No map without folds winds around a regular vertex twice.
+    let twice: Vec<u32> = quarters.iter().map(|q| 2 * q).collect();
+    assert!(around(&twice).is_none());
 }
 
 #[test]

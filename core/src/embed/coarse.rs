@@ -4,7 +4,7 @@
 //! So the layout is carried to a proxy of the mesh, optimised there, and carried back; what is left to do on the mesh
 //! itself is a first map and a few steps that nodes are off.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -12,8 +12,8 @@ use rayon::prelude::*;
 use super::EmbeddingError;
 use super::course::Course;
 use super::descent::Optimizer;
-use super::injective::{Drawn, STEPS};
 use super::job::{Embedded, Job, Next, Settings, Snapshot, Surface};
+use super::net::Net;
 use super::optimise::optimise;
 use crate::layout::{Embedding, Line, PatchMap, QuadLayout, carry};
 use crate::mesh::{FaceId, TriMesh, VertexId};
@@ -98,11 +98,12 @@ fn by_way_of_proxy(
     let steps = if surface.sharp.contains(&true) { 0 } else { FINE_STEPS };
     let settings = Settings { steps: steps.min(job.settings.steps), ..job.settings };
     let fine = Job { drawing: &drawing, settings, ..*job };
-    let drawn = Drawn::new(layout, &drawing, progress)?;
-    let guess = levels.guess(layout, &drawn, &coarse.maps);
-    let start = match Optimizer::from_drawn(&fine, &drawn, (&guess, FIRST_STEPS, PULL), progress)? {
+    let ready = Optimizer::finer_net(&fine)?;
+    progress.check()?;
+    let guess = levels.guess(&ready.0, &coarse.maps);
+    let start = match Optimizer::from_guess(&fine, ready, (&guess, FIRST_STEPS, PULL), progress)? {
         Ok(start) => Ok(start),
-        Err(_) => Optimizer::from_drawn(&fine, &drawn, (&drawn.uv, STEPS, 1.0), progress)?,
+        Err(_) => Optimizer::from_drawing(&fine, progress)?,
     };
     let mut course = Course::going_on(&fine, &coarse.report, watch);
     let mut done = course.without_folds(&fine, Ok(start), progress)?;
@@ -157,42 +158,40 @@ impl Levels<'_> {
         Ok(carry((layout, drawing, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
     }
 
-    /// The map of the proxy on a drawing on the mesh: coordinates of the corners of each triangle up to a translation.
-    fn guess(&self, layout: &QuadLayout, drawn: &Drawn, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
-        let turns = turns(layout);
+    /// The map of the proxy on a net on the mesh: coordinates of the corners of each triangle up to translations and quarter
+    /// turns.
+    fn guess(&self, net: &Net, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
         let mut pieces: Vec<Vec<Affine>> = vec![Vec::new(); self.proxy.mesh().n_faces()];
-        for (p, map) in (0..).zip(maps) {
+        for map in maps {
             for f in map.mesh.faces() {
-                pieces[map.base_face[f.index()] as usize].extend(Affine::of(map, f, p));
+                pieces[map.base_face[f.index()] as usize].extend(Affine::of(map, f));
             }
         }
-        let mesh = &drawn.mesh;
+        let mesh = &net.mesh;
         let found = |f: FaceId| {
             let center = mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>() / 3.0;
-            let face = FaceId(drawn.base_face[f.index()]);
+            let face = net.base_face[f.index()];
             let corners = self.fine.face_vertices(face).map(|v| self.fine.position(v));
             let at = SurfacePoint { face, weights: nearest_in_triangle(center, &corners) };
             let there = self.proxy.to_proxy(self.fine, at);
             let at = there.position(self.proxy.mesh());
-            // Arcs run elsewhere on the proxy: what lies between is mapped there in the chart of the patch beyond.
-            let own = |a: &Affine| Some(a.turned(*turns.get(&(drawn.patch[f.index()], a.patch))?));
-            let near = pieces[there.face.index()].iter().filter_map(own);
-            near.min_by(|a, b| a.center.distance_squared(at).total_cmp(&b.center.distance_squared(at)))
+            let near = pieces[there.face.index()].iter();
+            near.min_by(|a, b| a.center.distance_squared(at).total_cmp(&b.center.distance_squared(at))).copied()
         };
         let mut maps: Vec<Option<Affine>> = mesh.faces().collect::<Vec<_>>().into_par_iter().map(found).collect();
-        // Where even that is not known it is the map next to it in the patch.
+        // Where that is not known, as its piece was none, it is the map next to it.
         let mut queue: VecDeque<FaceId> = mesh.faces().filter(|f| maps[f.index()].is_some()).collect();
         while let Some(f) = queue.pop_front() {
             for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|h| mesh.face(h)) {
-                if maps[g.index()].is_none() && drawn.patch[g.index()] == drawn.patch[f.index()] {
+                if maps[g.index()].is_none() {
                     maps[g.index()] = maps[f.index()];
                     queue.push_back(g);
                 }
             }
         }
-        let uv = |f: FaceId| match &maps[f.index()] {
-            Some(map) => mesh.face_vertices(f).map(|v| map.uv(mesh.position(v))),
-            None => drawn.uv[f.index()],
+        let uv = |f: FaceId| {
+            let map = maps[f.index()].unwrap_or_default();
+            mesh.face_vertices(f).map(|v| map.uv(mesh.position(v)))
         };
         mesh.faces().map(uv).collect()
     }
@@ -202,30 +201,9 @@ impl Levels<'_> {
     }
 }
 
-/// For patches that share an arc, and each with itself, by how many quarters the chart of the second is to be turned to
-/// become that of the first but for a translation.
-fn turns(layout: &QuadLayout) -> HashMap<(u32, u32), i32> {
-    let mut sides: Vec<Vec<(u32, i32)>> = vec![Vec::new(); layout.arcs.len()];
-    for (p, patch) in (0..).zip(&layout.patches) {
-        for (i, &(arc, _)) in (0..).zip(&patch.sides) {
-            sides[arc as usize].push((p, i));
-        }
-    }
-    let mut turns: HashMap<(u32, u32), i32> = (0..layout.patches.len() as u32).map(|p| ((p, p), 0)).collect();
-    for list in &sides {
-        if let &[(p, i), (q, j)] = &list[..] {
-            // Side `i` runs in direction `i` of its patch; both patches see it from their left.
-            turns.entry((p, q)).or_insert((i - j + 2).rem_euclid(4));
-            turns.entry((q, p)).or_insert((j - i + 2).rem_euclid(4));
-        }
-    }
-    turns
-}
-
 /// The map of a triangle of the proxy.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Affine {
-    patch: u32,
     center: DVec3,
     /// The gradients of both coordinates.
     gradients: [DVec3; 2],
@@ -233,7 +211,7 @@ struct Affine {
 
 impl Affine {
     /// That of a triangle of a patch; `None` if the triangle is none.
-    fn of(map: &PatchMap, f: FaceId, patch: u32) -> Option<Self> {
+    fn of(map: &PatchMap, f: FaceId) -> Option<Self> {
         let corners = map.mesh.face_vertices(f);
         let [a, b, c] = corners.map(|v| map.mesh.position(v));
         let [ua, ub, uc] = corners.map(|v| map.uv[v.index()]);
@@ -242,19 +220,7 @@ impl Affine {
         let gradient = |k: usize| hats[0] * ua[k] + hats[1] * ub[k] + hats[2] * uc[k];
         let gradients = [gradient(0), gradient(1)];
         let finite = gradients.iter().all(|g| g.is_finite());
-        finite.then_some(Self { patch, center: (a + b + c) / 3.0, gradients })
-    }
-
-    /// The same map in a chart turned by so many quarters.
-    fn turned(&self, quarters: i32) -> Self {
-        let [u, v] = self.gradients;
-        let gradients = match quarters {
-            0 => [u, v],
-            1 => [-v, u],
-            2 => [-u, -v],
-            _ => [v, -u],
-        };
-        Self { gradients, ..*self }
+        finite.then_some(Self { center: (a + b + c) / 3.0, gradients })
     }
 
     fn uv(&self, p: DVec3) -> DVec2 {

@@ -25,7 +25,7 @@ use crate::surface::PrincipalCurvature;
 
 /// Share of the energy that a step without folds has to gain to be worth another, and how many may gain less in a row: the
 /// energy cannot fall below its ideal, so that this is a share of what matters, unlike with least squares.
-const LITTLE: f64 = 1e-3;
+const LITTLE: f64 = 3e-3;
 const IDLE: usize = 2;
 /// Halvings of such a step at most: what does not help at a quarter of its length is more than a matter of length.
 const HALVINGS: usize = 2;

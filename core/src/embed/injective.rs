@@ -29,8 +29,6 @@ pub(super) struct Drawn {
     pub embedding: Embedding,
     /// The coordinates of the corners of each triangle, in the chart of its patch.
     pub uv: Vec<[DVec2; 3]>,
-    /// The patch of each triangle.
-    pub patch: Vec<u32>,
 }
 
 impl Drawn {
@@ -38,9 +36,9 @@ impl Drawn {
     pub(super) fn new(layout: &QuadLayout, drawing: &Embedding, progress: &Progress) -> Result<Self, EmbeddingError> {
         let maps = map_patches(layout, drawing, progress)?;
         let mut positions: Vec<DVec3> = drawing.mesh.positions.clone();
-        let (mut faces, mut base_face, mut uv, mut patch) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
         let mut seeds = Vec::with_capacity(maps.len());
-        for (p, PatchMap { mesh, whole, base_face: base, uv: at, .. }) in (0..).zip(&maps) {
+        for PatchMap { mesh, whole, base_face: base, uv: at, .. } in &maps {
             let first_new = positions.len() - whole.len();
             let global = |v: usize| whole.get(v).copied().unwrap_or((first_new + v) as u32);
             positions.extend(&mesh.positions()[whole.len()..]);
@@ -51,7 +49,6 @@ impl Drawn {
                 uv.push(corners.map(|v| at[v.index()]));
             }
             base_face.extend(base);
-            patch.resize(faces.len(), p);
         }
         let mesh = TriMesh::from_faces(positions, &faces)?;
         let mut refined = RefinedMesh::new(&mesh);
@@ -69,7 +66,7 @@ impl Drawn {
             seeds,
             mesh: refined,
         };
-        Ok(Self { mesh, base_face, embedding, uv, patch })
+        Ok(Self { mesh, base_face, embedding, uv })
     }
 }
 
@@ -77,7 +74,10 @@ impl Drawn {
 /// not to be paid for by angles.
 const SIZE: f64 = 0.06;
 /// Steps of Newton's method for a first map: it has long converged by then.
-pub(super) const STEPS: usize = 60;
+const STEPS: usize = 60;
+
+/// A net with what is known of its mesh: sharp edges, and curvature at the vertices.
+pub(super) type Known = (Net, Vec<bool>, Vec<PrincipalCurvature>);
 
 impl<'a> Optimizer<'a> {
     /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.
@@ -87,28 +87,44 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub(super) fn from_drawing(job: &Job<'a>, progress: &Progress) -> Result<Result<Self, Folded>, EmbeddingError> {
         let drawn = Drawn::new(job.layout, job.drawing, progress)?;
-        Self::from_drawn(job, &drawn, (&drawn.uv, STEPS, 1.0), progress)
-    }
-
-    /// As [`Self::from_drawing`], from a map near to that with coordinates `uv` of the corners of each triangle, in so many
-    /// steps of Newton's method at most, with features pulled so many times as hard as usual.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(super) fn from_drawn(
-        job: &Job<'a>,
-        drawn: &Drawn,
-        (uv, steps, pull): (&[[DVec2; 3]], usize, f64),
-        progress: &Progress,
-    ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
         for f in &mut net.base_face {
             *f = FaceId(drawn.base_face[f.index()]);
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::Injective { shape: shape(job), start: Start::Map(uv), steps };
-        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled(pull)), progress)
+        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
+        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
+    }
+
+    /// The net of a drawn layout, with what is known of its mesh, and enough triangles around irregular nodes for a map
+    /// without folds.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn finer_net(job: &Job<'_>) -> Result<Known, EmbeddingError> {
+        let (net, sharp, curvature) = Self::net(job)?;
+        Ok(match net.finer_at_nodes(&net.angle, &sharp, &curvature)? {
+            Some((net, carried)) => (net, carried.sharp, carried.at_vertex),
+            None => (net, sharp, curvature),
+        })
+    }
+
+    /// Sets up an optimisation without folds on a net from the coordinates of the corners of each triangle in a map nearly
+    /// like those wanted, up to translations and quarter turns, in so many steps of Newton's method at most, with features
+    /// pulled so many times as hard as usual. [`Folded`] if there is no map without folds near that.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(super) fn from_guess(
+        job: &Job<'a>,
+        known: Known,
+        (uv, steps, pull): (&[[DVec2; 3]], usize, f64),
+        progress: &Progress,
+    ) -> Result<Result<Self, Folded>, EmbeddingError> {
+        let aim = Aim::Injective { shape: shape(job), start: Start::Turned(uv), steps };
+        Self::on(job, known, (aim, Features::Pulled(pull)), progress)
     }
 
     /// Sets up an optimisation without folds that starts from where another has ended. [`Folded`] if that map folds.

@@ -74,6 +74,9 @@ impl Features {
 pub(super) enum Start<'s> {
     /// From a map without folds: the coordinates of the corners of each triangle.
     Map(&'s [[DVec2; 3]]),
+    /// From a map that need not satisfy the relations, nor be in the chart of each triangle: as [`Self::Map`], up to
+    /// translations and quarter turns.
+    Turned(&'s [[DVec2; 3]]),
     /// From a map without folds on the same net, which need not satisfy what is demanded now.
     Here(&'s [[DVec2; 3]]),
     /// From the map before nodes moved. Where a node has left its vertex or come to another the field turns with it, and
@@ -276,6 +279,7 @@ impl Setting<'_> {
         let Self { net, metric, field, objective, firmness, pulled } = *self;
         let wanted = match start {
             Start::Map(uv) | Start::Here(uv) => gradients(metric, &field.angle, uv),
+            Start::Turned(uv) => gradients(metric, &field.angle, uv).into_iter().map(along_field).collect(),
             Start::Moved { uv, gradients: before, turned } => {
                 let mut list = gradients(metric, &field.angle, uv);
                 for (f, g) in list.iter_mut().enumerate().filter(|(f, _)| turned[*f]) {
@@ -287,7 +291,7 @@ impl Setting<'_> {
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
         let newton = system.newton()?;
         let few = match start {
-            Start::Map(_) => FEW_AT_FIRST,
+            Start::Map(_) | Start::Turned(_) => FEW_AT_FIRST,
             Start::Moved { .. } => FEW,
             Start::Here(_) => 0,
         };
@@ -307,7 +311,7 @@ impl Setting<'_> {
             tracing::debug!(folds = folded.len(), left = unfolded.folds.len(), "folds of the first guess");
             found = system.injective(&energy, unfolded.y.clone());
             // Of a step there are others; of a first map there is only one that is much worse.
-            if found.is_none() && matches!(start, Start::Map(_)) {
+            if found.is_none() && matches!(start, Start::Map(_) | Start::Turned(_)) {
                 let whole = (&net.mesh, &quarters[..]);
                 found = system.untangle(&newton, &energy, unfolded.y, whole, progress)?;
             }
@@ -351,6 +355,12 @@ impl Setting<'_> {
         }
         Ok((free, folded))
     }
+}
+
+/// The gradients `∇u` and `∇v` in the frame of the field after that number of quarter turns with which they follow it best.
+fn along_field([a, b, c, d]: [f64; 4]) -> [f64; 4] {
+    let turned = [[a, b, c, d], [c, d, -a, -b], [-a, -b, -c, -d], [-c, -d, a, b]];
+    turned.into_iter().max_by(|g, h| (g[0] + g[3]).total_cmp(&(h[0] + h[3]))).unwrap_or([a, b, c, d])
 }
 
 /// The lengths that the field asks for, and the analysis of the system that they solve.

@@ -11,13 +11,14 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::map::Proxy;
+use super::string::{dense, strung};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::{Crossing, CurveError, SurfaceCurve, SurfacePoint, nearest_in_triangle};
 
 /// How far along the curve sides are taken from, in mean edges of the proxy that it crosses.
 const REACH: f64 = 2.5;
 /// Distance in edge parameters kept from vertices; that of the other makers of curves.
-const VERTEX_DISTANCE: f64 = 1e-3;
+pub(super) const VERTEX_DISTANCE: f64 = 1e-3;
 /// Places along the curve from which it is tried.
 const STARTS: usize = 12;
 /// Triangles around a start in which an edge between the sides is looked for.
@@ -238,7 +239,10 @@ impl Proxy {
             return Err(CarryError::Lost);
         }
         let guide = Guide::along(self.mesh(), line, closed);
-        self.along_on_original(original, &guide)
+        self.along_on_original(original, &guide).or_else(|lost| {
+            let images: Vec<SurfacePoint> = dense(self.mesh(), line).map(|p| self.to_original(original, p)).collect();
+            if closed { strung(original, &images).ok_or(lost) } else { Err(lost) }
+        })
     }
 
     /// The curve on the proxy that goes as `curve` goes on the original, as [`Self::curve_to_original`] the other way.
@@ -267,12 +271,15 @@ impl Proxy {
         if line.len() < 2 {
             return Err(CarryError::Lost);
         }
-        let points = line.iter().map(|&(p, face)| {
+        let point = |&(p, face): &(DVec3, FaceId)| {
             let corners = original.face_vertices(face).map(|v| original.position(v));
             SurfacePoint { face, weights: nearest_in_triangle(p, &corners) }
-        });
-        let guide = Guide::image(self, original, points, closed);
-        self.along(&guide)
+        };
+        let guide = Guide::image(self, original, line.iter().map(point), closed);
+        self.along(&guide).or_else(|lost| {
+            let images: Vec<SurfacePoint> = line.iter().map(|p| self.to_proxy(original, point(p))).collect();
+            if closed { strung(self.mesh(), &images).ok_or(lost) } else { Err(lost) }
+        })
     }
 
     fn along_on_original(&self, original: &TriMesh, guide: &Guide) -> Result<SurfaceCurve, CarryError> {

@@ -15,6 +15,7 @@ mod quadric;
 mod shape;
 mod smooth;
 mod star;
+mod string;
 
 use thiserror::Error;
 

@@ -23,7 +23,7 @@ use crate::progress::{Cancelled, Progress};
 const SHARE: f64 = 0.2;
 const LEAST: f64 = 1e-6;
 /// Steps of Newton's method at most; folds that go are mostly gone after ten.
-const STEPS: usize = 60;
+const STEPS: usize = 30;
 /// Steps in a row that may leave as many folds as there were.
 const PATIENCE: usize = 12;
 

@@ -133,7 +133,11 @@ impl Solver<'_> {
         progress: &Progress,
     ) -> Result<Result<State, Folded>, EmbeddingError> {
         let mesh = &net.mesh;
-        let angle = self.angles(&net, &metric, previous, progress)?;
+        let guessed = match aim {
+            Aim::Injective { start: Start::Turned(uv), .. } => Some(directions(&net, &metric, uv)),
+            _ => None,
+        };
+        let angle = self.angles(&net, &metric, previous.or(guessed.as_deref()), progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
@@ -361,6 +365,16 @@ impl Setting<'_> {
 fn along_field([a, b, c, d]: [f64; 4]) -> [f64; 4] {
     let turned = [[a, b, c, d], [c, d, -a, -b], [-a, -b, -c, -d], [-c, -d, a, b]];
     turned.into_iter().max_by(|g, h| (g[0] + g[3]).total_cmp(&(h[0] + h[3]))).unwrap_or([a, b, c, d])
+}
+
+/// The angles of the field nearest to that of the drawing that a map follows which is given up to quarter turns.
+fn directions(net: &Net, metric: &Metric, uv: &[[DVec2; 3]]) -> Vec<f64> {
+    let turned = |g: [f64; 4]| {
+        let [a, b, c, d] = along_field(g);
+        (b - c).atan2(a + d)
+    };
+    let off = gradients(metric, &net.angle, uv).into_iter().map(turned);
+    net.angle.iter().zip(off).map(|(angle, off)| angle + off).collect()
 }
 
 /// The lengths that the field asks for, and the analysis of the system that they solve.

@@ -4,7 +4,7 @@
 //! folds, is where maps that never fold go on from; else these start from the drawing.
 
 use super::descent::Optimizer;
-use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Snapshot};
+use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Settings, Snapshot};
 use super::measures::measure_patches;
 use super::solver::Folded;
 use super::state::State;
@@ -86,68 +86,66 @@ impl<'w> Course<'w> {
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
         let flipped_at_rest = optimizer.state().flipped();
-        if optimizer.is_hopeless() && !job.layout.patches.is_empty() && job.settings.integer.is_none() {
-            let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
-            let mut done = match self.without_folds(job, start, progress) {
-                Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
-                Err(error) => {
-                    tracing::debug!(%error, "not from a map with many folds: from the drawing");
-                    self.unfolded(job, Err(error), progress)?
+        let Settings { integer, .. } = job.settings;
+        let complete = !job.layout.patches.is_empty();
+        let found = if optimizer.is_hopeless() && complete && integer.is_none() {
+            Err(EmbeddingError::Folded)
+        } else {
+            self.least_squares(job, &mut optimizer, progress)
+        };
+        let is_whole = |done: &Embedded| done.report.folds.is_empty();
+        let mut done = match found {
+            Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            // Nodes that move on would leave the grid.
+            Ok(done) if !complete || (integer.is_some() && is_whole(&done)) => done,
+            found => {
+                let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
+                match (self.without_folds(job, start, progress), found) {
+                    (Ok(done), _) => done,
+                    (Err(EmbeddingError::Cancelled(cancelled)), _) => return Err(cancelled.into()),
+                    (Err(_), Ok(done)) if is_whole(&done) => done,
+                    (Err(error), found) => {
+                        tracing::debug!(%error, "no map without folds near that of least squares");
+                        self.from_drawing(job, found, progress)?
+                    }
                 }
-                Ok(mut done) => {
-                    self.enter(&mut done.report);
-                    done
-                }
-            };
-            done.report.flipped_at_rest = flipped_at_rest;
-            return Ok(done);
-        }
-        if let Some(edge) = job.settings.integer {
-            progress.report("Rounding lengths", 0.35);
-            optimizer.round(edge, progress)?;
-            self.show(&optimizer);
-            self.rest(&mut optimizer, (0.35, 0.4), progress)?;
-        }
-        progress.report("Removing folds", 0.4);
-        let found = optimizer.finish(progress).and_then(|folds| {
-            let done = finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)?;
-            Ok((done, optimizer))
-        });
-        let mut done = self.unfolded(job, found, progress)?;
+            }
+        };
+        self.enter(&mut done.report);
         done.report.flipped_at_rest = flipped_at_rest;
         Ok(done)
     }
 
-    /// From what least squares have led to, if anything, to the embedding without folds.
-    pub(super) fn unfolded(
-        mut self,
+    /// The embedding that least squares lead to, with the folds that cannot be removed from it.
+    fn least_squares(
+        &mut self,
         job: &Job<'_>,
-        found: Result<(Embedded, Optimizer<'_>), EmbeddingError>,
+        optimizer: &mut Optimizer<'_>,
         progress: &Progress,
     ) -> Result<Embedded, EmbeddingError> {
-        let complete = !job.layout.patches.is_empty();
-        let mut done = match found {
-            Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            Ok((done, _)) if !complete => done,
-            // Nodes that move on would leave the grid.
-            Ok((done, _)) if job.settings.integer.is_some() && done.report.folds.is_empty() => done,
-            Ok((done, optimizer)) if done.report.folds.is_empty() => {
-                let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
-                self.without_folds(job, start, progress).or_else(|error| match error {
-                    EmbeddingError::Cancelled(_) => Err(error),
-                    _ => Ok(done),
-                })?
-            }
-            found => {
-                let start = Optimizer::from_drawing(job, progress);
-                self.without_folds(job, start, progress).or_else(|error| match error {
-                    EmbeddingError::Cancelled(_) => Err(error),
-                    _ => Ok(found?.0),
-                })?
-            }
-        };
-        self.enter(&mut done.report);
-        Ok(done)
+        if let Some(edge) = job.settings.integer {
+            progress.report("Rounding lengths", 0.35);
+            optimizer.round(edge, progress)?;
+            self.show(optimizer);
+            self.rest(optimizer, (0.35, 0.4), progress)?;
+        }
+        progress.report("Removing folds", 0.4);
+        let folds = optimizer.finish(progress)?;
+        finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)
+    }
+
+    /// The embedding without folds that the drawing leads to; if there is none, what was found before.
+    pub(super) fn from_drawing(
+        &mut self,
+        job: &Job<'_>,
+        found: Result<Embedded, EmbeddingError>,
+        progress: &Progress,
+    ) -> Result<Embedded, EmbeddingError> {
+        let start = Optimizer::from_drawing(job, progress);
+        self.without_folds(job, start, progress).or_else(|error| match error {
+            EmbeddingError::Cancelled(_) => Err(error),
+            _ => found,
+        })
     }
 
     /// Enters into a report what happened on the way.

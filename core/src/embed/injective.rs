@@ -138,7 +138,7 @@ impl<'a> Optimizer<'a> {
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
-        Self::on(job, (state.net, sharp, curvature), (aim, Features::Held), progress)
+        Self::on(job, (state.net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
     }
 }
 

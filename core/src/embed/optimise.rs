@@ -46,7 +46,12 @@ pub fn optimise(
             let course = Course::begin(job, &optimizer, watch);
             (optimizer, course)
         }
-        Err(error) => return Course::new(job, watch).unfolded(job, Err(error), progress),
+        Err(error) => {
+            let mut course = Course::new(job, watch);
+            let mut done = course.from_drawing(job, Err(error), progress)?;
+            course.enter(&mut done.report);
+            return Ok(done);
+        }
     };
     course.rest(&mut optimizer, MOVING, progress)?;
     let Settings { collapse, simplify, .. } = job.settings;

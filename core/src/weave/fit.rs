@@ -15,8 +15,8 @@ use crate::surface::SurfaceCurve;
 /// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
 /// half a degree.
 const PATCH: f64 = 0.005;
-/// What conformal distortion is worth, likewise: a tenth more or less of it shows as much as a degree.
-const DISTORTION: f64 = 10.0;
+/// What conformal distortion is worth, likewise: a tenth more or less of it shows as much as half a degree.
+const DISTORTION: f64 = 6.0;
 /// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
 const QUARTER: f64 = 0.01;
 /// What a node is worth that cannot be embedded well: of two patches or of more than six.

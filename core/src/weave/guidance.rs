@@ -109,14 +109,18 @@ mod tests {
         let model = Model::prepare(loaded, Options::default(), &Progress::new()).unwrap();
         let guidance = Guidance::new(&model, &Progress::new()).unwrap().unwrap();
         let none = DirectionMask::none();
+        let (mut alignment, mut length) = (0.0, 0.0);
         for v in (0..model.mesh.n_vertices()).step_by(97).map(VertexId::new) {
             for (v, direction) in guidance.queries(v) {
                 let query = ProposalQuery { direction, ..ProposalQuery::cheapest(v, &none) };
                 let found = guidance.graph.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
                 let l = &found.loops[0];
-                // On average 5° off, as far as the directions of the graph are apart.
-                assert!(l.alignment < l.length, "{direction:?}: {} of {}", l.alignment, l.length);
+                // 10° off where they deviate most: not all directions are geodesics of the graph.
+                assert!(l.alignment < 0.0154 * PULL * l.length, "{direction:?}: {} of {}", l.alignment, l.length);
+                (alignment, length) = (alignment + l.alignment, length + l.length);
             }
         }
+        // On average less than 5° off.
+        assert!(alignment < 0.0038 * PULL * length, "{alignment} of {length}");
     }
 }

@@ -1,10 +1,10 @@
 //! Improving a valid layout: other strips, with which patches follow the shape better and are fewer.
 //!
 //! What field and map of a layout show where its nodes are drawn (`super::fit`) is enough to choose between layouts, and is
-//! there in a tenth of a second. So many are tried. In each round a few changes of the strips are, and the one that makes
-//! the price least is made (`super::trial`), even if it makes it a little higher: the less so the more rounds have gone by.
-//! What comes near the best layout so far is looked into after some steps of its nodes, and if it is better then, it is the
-//! best. Random numbers are the same every time.
+//! there in a tenth of a second. So many are tried. In each round a few changes of the strips are (`super::trial`); those that
+//! make the price least are looked into after some steps of the nodes. The best of them is made, even if it makes the price a
+//! little higher: the less so the more rounds have gone by. The best layout of all is kept. Random numbers are the same every
+//! time.
 //!
 //! What matters does not depend on triangles much smaller than patches: a mesh of many triangles is improved on a
 //! proxy. A layout is taken over only if the strips make the same of the mesh that the session weaves on.
@@ -93,7 +93,7 @@ impl Session {
             if idle == IDLE {
                 break;
             }
-            if !changed || !trial.is_best(progress)? {
+            if !changed || !trial.is_best() {
                 continue;
             }
             let Some(strips) = self.carried(trial, progress)? else {

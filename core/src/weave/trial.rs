@@ -30,10 +30,12 @@ const PAIRS: usize = 3;
 const RINGS: usize = 2;
 /// By how much the price has to be less, in degrees, for a layout to be better.
 const LEAST_GAIN: f64 = 1e-3;
-/// Steps of the nodes after which a layout is judged that may be the best: after four of them a good one of Fertility has
+/// Steps of the nodes after which a layout is judged that is to be taken: after four of them a good one of Fertility has
 /// still half a degree too much, after eight a third.
-const STEPS: usize = 8;
-/// How far above the best so far a layout may be before its nodes move for it to be judged at all, in degrees.
+const STEPS: usize = 6;
+/// How many changes of a round are judged so, the best before nodes move, and how much worse than the present layout these
+/// may then be, in degrees.
+const LOOKED_INTO: usize = 2;
 const NEAR: f64 = 0.3;
 
 /// A strip that is tried.
@@ -49,11 +51,11 @@ pub(super) struct Tried {
 pub(super) struct Layout {
     pub strips: Vec<Tried>,
     /// The price before its nodes move.
-    pub drawn: f64,
-    /// What each triangle adds to the deviation.
-    shares: Vec<f64>,
-    /// How well it fits after they have; of the present layout it is told only of what comes near the best.
+    drawn: f64,
+    /// How well it fits after they have.
     pub fit: Fit,
+    /// What each triangle adds to its deviation.
+    shares: Vec<f64>,
 }
 
 impl Layout {
@@ -61,6 +63,10 @@ impl Layout {
         self.strips.iter().map(|s| &s.proposal.curve)
     }
 }
+
+/// How well a layout fits, and what each triangle adds to its deviation; `None` for what makes no layout, or one that cannot
+/// be drawn.
+type Judged = Option<(Fit, Vec<f64>)>;
 
 /// A change of the strips: one is left out, or a candidate added, or both.
 #[derive(Debug, Clone)]
@@ -88,9 +94,9 @@ impl Trial {
         };
         let strips: Vec<Tried> = session.design().strips.iter().zip(&design.strips).map(tried).collect();
         let all: Vec<&SurfaceCurve> = strips.iter().map(|s| &s.proposal.curve).collect();
-        let (drawn, shares) = fit(&model, &all, 0, progress)?;
-        let (moved, _) = fit(&model, &all, STEPS, progress)?;
-        let now = Layout { strips, drawn: drawn.price, shares, fit: moved };
+        let drawn = fit(&model, &all, 0, progress)?.0.price;
+        let (fit, shares) = fit(&model, &all, STEPS, progress)?;
+        let now = Layout { strips, drawn, shares, fit };
         let guidance = Guidance::new(&model, progress)?;
         let random = Random(1);
         Ok(Self { model, guidance, best: now.clone(), now, random })
@@ -101,25 +107,22 @@ impl Trial {
         Arc::ptr_eq(&self.model, model)
     }
 
-    /// Makes the best of some changes, if it lets the price rise by no more than so much; tells whether it did.
+    /// Makes a change after which the layout fits better, or worse by no more than so much; tells whether there was one.
     pub(super) fn change(&mut self, tolerance: f64, progress: &Progress) -> Result<bool, WeaveError> {
         let candidates = self.candidates(progress)?;
         let changes = self.changes(&candidates);
-        let fits: Vec<Option<(Fit, Vec<f64>)>> = changes
-            .par_iter()
-            .map(|change| {
-                progress.check()?;
-                // What makes no layout, or one that cannot be drawn, is no improvement.
-                Ok(fit(&self.model, &self.with(change, &candidates), 0, progress).ok())
-            })
-            .collect::<Result<_, Cancelled>>()?;
-        progress.check()?;
-        let possible = changes.into_iter().zip(fits).filter_map(|(change, fit)| Some((change, fit?)));
+        let drawn = self.fits(&changes, &candidates, 0, progress)?;
+        let pairs = changes.into_iter().zip(drawn).filter_map(|(change, found)| Some((change, found?.0.price)));
+        let mut hopeful: Vec<(Change, f64)> = pairs.filter(|(_, price)| *price < self.now.drawn + NEAR).collect();
+        hopeful.sort_by(|a, b| a.1.total_cmp(&b.1));
+        hopeful.truncate(LOOKED_INTO);
+        let (changes, drawn): (Vec<Change>, Vec<f64>) = hopeful.into_iter().unzip();
+        let moved = self.fits(&changes, &candidates, STEPS, progress)?;
         // What is only left out is not to cost anything: else strips would become fewer and fewer.
-        let most = |c: &Change| self.now.drawn + if c.add.is_empty() { 0.0 } else { tolerance };
-        let allowed = possible.filter(|(change, (fit, _))| fit.price < most(change));
-        let best = allowed.min_by(|a, b| a.1.0.price.total_cmp(&b.1.0.price));
-        let Some((change, (fit, shares))) = best else {
+        let most = |c: &Change| self.now.fit.price + if c.add.is_empty() { 0.0 } else { tolerance };
+        let found = changes.into_iter().zip(drawn).zip(moved).filter_map(|(pair, found)| Some((pair, found?)));
+        let allowed = found.filter(|((change, _), (fit, _))| fit.price < most(change));
+        let Some(((change, drawn), (fit, shares))) = allowed.min_by(|a, b| a.1.0.price.total_cmp(&b.1.0.price)) else {
             return Ok(false);
         };
         if let Some(out) = change.out {
@@ -127,23 +130,30 @@ impl Trial {
         }
         let added = change.add.iter().map(|&c| Tried { proposal: candidates[c].clone(), known: None });
         self.now.strips.extend(added);
-        (self.now.drawn, self.now.shares) = (fit.price, shares);
+        (self.now.drawn, self.now.fit, self.now.shares) = (drawn, fit, shares);
         Ok(true)
     }
 
-    /// Whether the present layout fits better than the best so far after its nodes have moved.
-    pub(super) fn is_best(&mut self, progress: &Progress) -> Result<bool, WeaveError> {
-        if self.now.drawn > self.best.drawn + NEAR {
-            return Ok(false);
-        }
-        let curves: Vec<&SurfaceCurve> = self.now.curves().collect();
-        let found = fit(&self.model, &curves, STEPS, progress).ok();
-        progress.check()?;
-        let Some((fit, _)) = found.filter(|(fit, _)| fit.price < self.best.fit.price - LEAST_GAIN) else {
-            return Ok(false);
+    /// How well the layouts fit that changes make, after so many steps of the nodes.
+    fn fits(
+        &self,
+        changes: &[Change],
+        candidates: &[Proposal],
+        steps: usize,
+        progress: &Progress,
+    ) -> Result<Vec<Judged>, Cancelled> {
+        let one = |change: &Change| {
+            progress.check()?;
+            Ok(fit(&self.model, &self.with(change, candidates), steps, progress).ok())
         };
-        self.now.fit = fit;
-        Ok(true)
+        let found = changes.par_iter().map(one).collect::<Result<_, Cancelled>>()?;
+        progress.check()?;
+        Ok(found)
+    }
+
+    /// Whether the present layout fits better than the best so far.
+    pub(super) fn is_best(&self) -> bool {
+        self.now.fit.price < self.best.fit.price - LEAST_GAIN
     }
 
     /// The present layout is the best so far, and these are its strips.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::model::Model;
 use super::proposal::Proposal;
 use super::session::WeaveError;
-use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
+use crate::elastica::{DirectionMask, ElasticaGraph, ProposalQuery, SearchWorkspace};
 use crate::mesh::VertexId;
 use crate::progress::Progress;
 
@@ -18,13 +18,13 @@ pub(super) type Query = (VertexId, Option<DVec3>);
 
 /// The loops that answer the queries, the cheapest first, at most so many.
 pub(super) fn loops(
-    model: &Model,
+    graph: &ElasticaGraph,
     queries: &[Query],
     mask: &DirectionMask,
     most: usize,
     progress: &Progress,
 ) -> Result<Vec<Proposal>, WeaveError> {
-    model.graph.prepare(progress)?;
+    graph.prepare(progress)?;
     let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
     let found: Vec<Vec<Proposal>> = queries
         .par_chunks(share)
@@ -33,7 +33,7 @@ pub(super) fn loops(
             let mut list = Vec::new();
             for &(vertex, direction) in queries {
                 let query = ProposalQuery { budget: BUDGET, direction, ..ProposalQuery::alternatives(vertex, mask) };
-                let found = model.graph.proposals(&query, &mut work, progress)?;
+                let found = graph.proposals(&query, &mut work, progress)?;
                 list.extend(found.loops.iter().map(Proposal::found));
             }
             Ok(list)

@@ -15,12 +15,8 @@ use crate::surface::SurfaceCurve;
 /// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
 /// half a degree.
 const PATCH: f64 = 0.005;
-/// What the energy of the map over the area is worth, likewise: 0.1 is that of a layout that suits the surface well, with
-/// 0.7 nodes end up where the map has to be stretched.
-const ENERGY: f64 = 4.0;
-/// What the share of triangles that fold is worth, likewise: where a chord would have to be of negative width, a map without
-/// folds squeezes it. A hundredth of them usually goes away when nodes move.
-const FOLDED: f64 = 40.0;
+/// What conformal distortion is worth, likewise: a tenth more or less of it shows as much as half a degree.
+const DISTORTION: f64 = 6.0;
 /// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
 const QUARTER: f64 = 0.01;
 /// What a node is worth that cannot be embedded well: of two patches or of more than six.
@@ -32,6 +28,8 @@ const USUAL: std::ops::RangeInclusive<i32> = -2..=1;
 pub struct Fit {
     /// The mean deviation from principal directions that is foreseen, in degrees.
     pub alignment: f64,
+    /// The mean conformal distortion that is foreseen.
+    pub conformal: f64,
     /// Number of patches.
     pub patches: usize,
     /// Number of irregular nodes.
@@ -75,11 +73,16 @@ pub(super) fn fit(
     let extreme = layout.nodes.iter().filter(|n| !USUAL.contains(&index(n))).count();
     let patches = layout.patches.len();
     let price = foreseen.alignment
-        + ENERGY * foreseen.energy
-        + FOLDED * foreseen.folded
+        + DISTORTION * (foreseen.conformal - 2.0)
         + PATCH * patches as f64
         + QUARTER * f64::from(quarters)
         + EXTREME * extreme as f64;
-    let fit = Fit { alignment: foreseen.alignment, patches, irregular: layout.n_irregular(), price };
+    let fit = Fit {
+        alignment: foreseen.alignment,
+        conformal: foreseen.conformal,
+        patches,
+        irregular: layout.n_irregular(),
+        price,
+    };
     Ok((fit, foreseen.shares))
 }

@@ -10,6 +10,7 @@ mod embedding;
 mod export;
 mod fit;
 mod ground;
+mod guidance;
 mod improve;
 mod layout;
 mod met;
@@ -23,6 +24,7 @@ mod session;
 mod suggest;
 #[cfg(test)]
 mod tests;
+mod trial;
 mod woven;
 
 pub use design::{Design, DesignError, Pin, Strip, StripId};

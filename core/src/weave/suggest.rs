@@ -157,7 +157,7 @@ impl Session {
                 Search::Around => around(self.model(), v).to_vec(),
             })
             .collect();
-        loops(self.model(), &queries, mask, TRIED, progress)
+        loops(&self.model().graph, &queries, mask, TRIED, progress)
     }
 
     /// The candidate of least cost per step of progress, if any makes progress.

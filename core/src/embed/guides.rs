@@ -110,7 +110,7 @@ mod tests {
             let axis = metric.angle_of(&cylinder, g.face, DVec3::Z).unwrap();
             let z = cylinder.face_vertices(g.face).map(|v| cylinder.position(v).z).iter().sum::<f64>() / 3.0;
             assert!(off_quarter(g.angle - axis) < 1e-2, "{g:?}");
-            let full = (12.0 * 12.0) * metric.area(g.face) / EQUILATERAL;
+            let full = (10.0 * STRENGTH).powi(2) * metric.area(g.face) / EQUILATERAL;
             assert!((g.weight / full - 1.0).abs() < 0.05 || !(0.05..0.75).contains(&z), "{g:?} {full}");
         }
         // A saddle of curvatures 4 and -4.

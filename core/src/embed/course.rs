@@ -106,7 +106,7 @@ impl<'w> Course<'w> {
                     (Err(_), Ok(done)) if is_whole(&done) => done,
                     (Err(error), found) => {
                         tracing::debug!(%error, "no map without folds near that of least squares");
-                        self.from_drawing(job, found, progress)?
+                        self.drawing_unfolded(job, found, progress)?
                     }
                 }
             }
@@ -135,7 +135,7 @@ impl<'w> Course<'w> {
     }
 
     /// The embedding without folds that the drawing leads to; if there is none, what was found before.
-    pub(super) fn from_drawing(
+    pub(super) fn drawing_unfolded(
         &mut self,
         job: &Job<'_>,
         found: Result<Embedded, EmbeddingError>,

@@ -48,7 +48,7 @@ pub fn optimise(
         }
         Err(error) => {
             let mut course = Course::new(job, watch);
-            let mut done = course.from_drawing(job, Err(error), progress)?;
+            let mut done = course.drawing_unfolded(job, Err(error), progress)?;
             course.enter(&mut done.report);
             return Ok(done);
         }

@@ -1,7 +1,7 @@
 //! The course of an optimisation: nodes move, folds go, arcs are traced and patches cut out.
 //!
-//! Least squares come first: their steps are cheap and find where features can be held. What they end with, if it has no
-//! folds, is where maps that never fold go on from; else these start from the drawing.
+//! Least squares come first: their steps are cheap and find where features can be held. What they end with, untangled if it
+//! folds, is where maps that never fold go on from; where it cannot be untangled these start from the drawing.
 
 use super::descent::Optimizer;
 use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Settings, Snapshot};

@@ -43,6 +43,9 @@ const NEWTON_STEPS: usize = 4;
 /// Rings of triangles around a node that has changed its vertex in which the field turns markedly with it.
 const TURNED_RINGS: usize = 2;
 
+/// A net with what is known of its mesh: sharp edges, and curvature at the vertices.
+pub(super) type Known = (Net, Vec<bool>, Vec<PrincipalCurvature>);
+
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
     pub(super) ground: Ground<'a>,
@@ -91,7 +94,7 @@ impl<'a> Optimizer<'a> {
     }
 
     /// The net of a drawn layout with what is known of its mesh: sharp edges, and curvature at the vertices.
-    pub(super) fn net(job: &Job<'_>) -> Result<(Net, Vec<bool>, Vec<PrincipalCurvature>), EmbeddingError> {
+    pub(super) fn net(job: &Job<'_>) -> Result<Known, EmbeddingError> {
         let Job { surface, layout, .. } = *job;
         let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
         let sharp = sharp_edges(&surface, &net);
@@ -111,7 +114,7 @@ impl<'a> Optimizer<'a> {
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
     pub(super) fn on(
         job: &Job<'a>,
-        (net, sharp, curvature): (Net, Vec<bool>, Vec<PrincipalCurvature>),
+        (net, sharp, curvature): Known,
         (aim, features): (Aim<'_>, Features),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {

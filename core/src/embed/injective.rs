@@ -1,4 +1,4 @@
-//! Maps without folds from the drawing of a layout.
+//! Where maps without folds start: from the drawing of a layout, from another map, from a guess.
 //!
 //! A drawing with every patch mapped one to one onto its rectangle, opposite sides of equal length, is a seamless map of
 //! the whole surface without folds, however bad its shape. From there the energy of [`crate::param::InjectiveEnergy`] is
@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
-use super::descent::Optimizer;
+use super::descent::{Known, Optimizer};
 use super::job::{Job, Surface};
 use super::net::Net;
 use super::solver::{Aim, Features, Folded, Start};
@@ -75,9 +75,6 @@ impl Drawn {
 const SIZE: f64 = 0.06;
 /// Steps of Newton's method for a first map: it has long converged by then.
 const STEPS: usize = 60;
-
-/// A net with what is known of its mesh: sharp edges, and curvature at the vertices.
-pub(super) type Known = (Net, Vec<bool>, Vec<PrincipalCurvature>);
 
 impl<'a> Optimizer<'a> {
     /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.

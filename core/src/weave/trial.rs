@@ -68,7 +68,7 @@ impl Layout {
 /// be drawn.
 type Judged = Option<(Fit, Vec<f64>)>;
 
-/// A change of the strips: one is left out, or a candidate added, or both.
+/// A change of the strips: one is left out, or candidates are added, or both.
 #[derive(Debug, Clone)]
 struct Change {
     out: Option<usize>,

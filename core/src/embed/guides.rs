@@ -14,14 +14,18 @@ use crate::field::{Guide, Metric, RELIABLE};
 use crate::mesh::{FaceId, TriMesh};
 use crate::surface::PrincipalCurvature;
 
-/// The distance over which a principal direction prevails is the inverse of this times `κ₁ − κ₂`.
+/// The distance over which a principal direction prevails is the inverse of the strength times `κ₁ − κ₂`.
 ///
-/// Least squares follow a field that turns this much with more residual and more folds; maps without folds can. Measured by
-/// these at 1.2, 1.7, 2.4 and 3.6: directions deviate by 4.8°, 4.2°, 3.6° and 3.1° (Fertility, 89 patches), 7.9°, 6.6°, 6.1°
-/// and 5.0° (elephant, 139) and 5.7°, 5.0°, 4.3° and 3.9° (rocker arm, 28), and the conformal distortion over 2 is 0.016,
-/// 0.025, 0.033 and 0.043, 0.031, 0.038, 0.054 and 0.100, 0.021, 0.031, 0.050 and 0.063. At 2.0 the fan disk has edges of
-/// features that cannot be held, at 2.4 none can.
+/// In maps of least squares: with more, these follow with more residual and more folds.
 const STRENGTH: f64 = 1.7;
+/// In maps without folds, which can follow more. Measured at 1.7, 2.6 and 3.4 there and 1.7 in least squares:
+/// directions deviate by 4.3°, 3.7° and 3.3° (Fertility, 84 patches), 3.9°, 3.0° and 2.6° (cino_3holes) and 5.6°, 4.7° and 4.3°
+/// (rocker arm, 68), and the conformal distortion over 2 is 0.021, 0.031 and 0.042, 0.023, 0.029 and 0.032, 0.028, 0.046 and
+/// 0.057.
+const STRENGTH_WHOLE: f64 = 2.6;
+/// Length of features, in square roots of the surface's area, from which on they carry the shape: there maps without folds
+/// follow no more than least squares do, or features could not be held (on the fan disk at 2.6 none).
+const CREASED: f64 = 4.0;
 /// Largest `κ₁ − κ₂` that counts, in inverse bounding-box diagonals: no bend is seen sharper than the ball of radius
 /// 0.03 that curvature is averaged over, larger values stem from slivers and creases.
 const MOST: f64 = 40.0;
@@ -34,9 +38,17 @@ const LEAST: f64 = 1.0;
 /// The smoothness weight of an edge between equilateral triangles, its length over the distance of their centres.
 const EQUILATERAL: f64 = 1.732_050_807_568_877_2;
 
-/// The reliable principal directions, by triangle. `curvature` has an entry per vertex, `sharp` a flag per edge
-/// (empty: none). Corners on sharp edges tell nothing of the smooth surface beside them and are left out.
-pub fn shape_guides(mesh: &TriMesh, metric: &Metric, curvature: &[PrincipalCurvature], sharp: &[bool]) -> Vec<Guide> {
+/// The reliable principal directions, by triangle, for a map of least squares or one that is `whole`, without folds.
+/// `curvature` has an entry per vertex, `sharp` a flag per edge (empty: none). Corners on sharp edges tell nothing of the
+/// smooth surface beside them and are left out.
+pub fn shape_guides(
+    mesh: &TriMesh,
+    metric: &Metric,
+    curvature: &[PrincipalCurvature],
+    sharp: &[bool],
+    whole: bool,
+) -> Vec<Guide> {
+    let strength = if whole && !is_creased(mesh, metric, sharp) { STRENGTH_WHOLE } else { STRENGTH };
     let mut on_crease = vec![false; mesh.n_vertices()];
     for e in mesh.edges().filter(|e| sharp.get(e.index()).copied().unwrap_or(false)) {
         for v in mesh.edge_vertices(e) {
@@ -45,18 +57,25 @@ pub fn shape_guides(mesh: &TriMesh, metric: &Metric, curvature: &[PrincipalCurva
     }
     let bending = face_curvature(mesh, curvature, |v| !on_crease[v.index()]);
     let guide = |face: FaceId| {
-        let pull = pull(&bending[face.index()])?;
+        let pull = pull(&bending[face.index()], strength)?;
         let angle = metric.angle_of(mesh, face, bending[face.index()].d_max)?;
         Some(Guide { face, angle, weight: pull * metric.area(face) / EQUILATERAL, branch: None })
     };
     mesh.faces().filter_map(guide).collect()
 }
 
-/// The strength of a guide in inverse squared lengths; `None` where the directions mean nothing.
-fn pull(c: &PrincipalCurvature) -> Option<f64> {
+/// Whether features carry the shape.
+fn is_creased(mesh: &TriMesh, metric: &Metric, sharp: &[bool]) -> bool {
+    let length: f64 = mesh.edges().zip(sharp).filter(|(_, sharp)| **sharp).map(|(e, _)| mesh.edge_length(e)).sum();
+    let area: f64 = mesh.faces().map(|f| metric.area(f)).sum();
+    length > CREASED * area.sqrt()
+}
+
+/// The weight of a guide in inverse squared lengths; `None` where the directions mean nothing.
+fn pull(c: &PrincipalCurvature, strength: f64) -> Option<f64> {
     let difference = c.k_max - c.k_min;
     let relative = difference / (c.k_min.abs() + c.k_max.abs()).max(f64::MIN_POSITIVE);
-    let pull = ramp(relative, ANISOTROPIC) * (STRENGTH * difference.min(MOST)).powi(2);
+    let pull = ramp(relative, ANISOTROPIC) * (strength * difference.min(MOST)).powi(2);
     (pull > LEAST).then_some(pull)
 }
 
@@ -88,7 +107,7 @@ mod tests {
 
     fn guides(mesh: &TriMesh) -> Vec<Guide> {
         let curvature = principal_curvature(mesh, 0.03, &vec![false; mesh.n_edges()]);
-        shape_guides(mesh, &Metric::new(mesh), &curvature, &[])
+        shape_guides(mesh, &Metric::new(mesh), &curvature, &[], false)
     }
 
     /// How far an angle is from a multiple of a quarter turn.
@@ -151,7 +170,7 @@ mod tests {
         let mut sharp = sharp_edges(&mesh, SHARP_DIHEDRAL);
         drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
-        let found = shape_guides(&mesh, &metric, &curvature, &sharp);
+        let found = shape_guides(&mesh, &metric, &curvature, &sharp, false);
         let bending = face_curvature(&mesh, &curvature, |_| true);
         let (mut directions, mut weights) = (vec![DVec3::ZERO; mesh.n_faces()], vec![0.0; mesh.n_faces()]);
         for g in &found {

@@ -137,12 +137,13 @@ impl Solver<'_> {
             Aim::Injective { start: Start::Turned(uv), .. } => Some(directions(&net, &metric, uv)),
             _ => None,
         };
-        let angle = self.angles(&net, &metric, previous.or(guessed.as_deref()), progress)?;
+        // A map of least squares is torn by what contradicts it; one without folds shows what can be followed.
+        let whole = matches!(aim, Aim::Injective { .. });
+        let shape = shape_guides(mesh, &metric, self.curvature, self.sharp, whole);
+        let angle = self.angles((&net, &metric), &shape, previous.or(guessed.as_deref()), progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
         let firmness = firmness(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
-        // A map of least squares is torn by what contradicts it; one without folds shows what can be followed.
-        let whole = matches!(aim, Aim::Injective { .. });
         let slant = if whole { alignment::WHOLE } else { alignment::SLANT };
         let features = alignment::features(&net, &metric, &field.angle, self.sharp, slant);
         let is_loose = |h: HalfedgeId| self.loose.get(mesh.edge(h).index()).copied().unwrap_or(false);
@@ -211,17 +212,17 @@ impl Solver<'_> {
         }
     }
 
-    /// The angles of the guiding field; at first, without those of a field before, in several rounds.
+    /// The angles of the field that principal directions guide; at first, without those of a field before, in several
+    /// rounds.
     fn angles(
         &self,
-        net: &Net,
-        metric: &Metric,
+        (net, metric): (&Net, &Metric),
+        shape: &[field::Guide],
         previous: Option<&[f64]>,
         progress: &Progress,
     ) -> Result<Vec<f64>, EmbeddingError> {
         let mesh = &net.mesh;
         let held = self.held_directions(net, metric);
-        let shape = shape_guides(mesh, metric, self.curvature, self.sharp);
         let (mut angle, rounds) = match previous {
             Some(angle) => (angle.to_vec(), 1),
             None => (net.angle.clone(), FIRST_ROUNDS),

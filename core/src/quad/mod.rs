@@ -1,6 +1,7 @@
 //! Quad meshes: refining a layout, smoothing on the surface, quality.
 
 mod ground;
+mod near;
 mod optimise;
 mod rail;
 mod refine;
@@ -9,6 +10,7 @@ mod smooth;
 mod stops;
 mod worst;
 
+pub use near::near;
 pub use refine::{QuadMesh, refine};
 pub use smooth::{land, quality, scaled_jacobians, smooth};
 pub use stops::{Stops, whole_counts};

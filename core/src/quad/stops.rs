@@ -11,6 +11,7 @@
 
 use glam::DVec3;
 
+use super::refine::QuadMesh;
 use crate::layout::{Patch, PatchMap, QuadLayout};
 use crate::mesh::FaceId;
 
@@ -25,6 +26,8 @@ const LONGEST: f64 = 4.0;
 /// bends without end.
 const BENT: f64 = 3.0;
 const SHARPEST: f64 = 5.0;
+/// By what factor lines become denser at most in one round where quads are far from the surface.
+const CLOSER: f64 = 1.5;
 /// Fewest quads across a chord: with three no two quads share two edges and none touches itself, however small the layout.
 const FEWEST: u32 = 3;
 /// Most quads across a chord.
@@ -65,10 +68,48 @@ impl Stops {
 
     fn new(layout: &QuadLayout, agrees: Vec<bool>, density: &[Vec<f64>], counts: &[u32]) -> Self {
         Self {
-            of_chord: density.iter().zip(counts).map(|(density, &n)| quantiles(density, n)).collect(),
+            of_chord: density.iter().zip(counts).map(|(density, &n)| quantiles(&parts(density), n)).collect(),
             agrees,
             chord: layout.arcs.iter().map(|a| a.chord).collect(),
         }
+    }
+
+    /// These lines with others between where edges across are far from the surface, and fewer elsewhere: about as many quads
+    /// in all as there are. `quads` are their refinement, and `far` tells of each how far its edges along either side are
+    /// from the surface; those farther than `bound` are to come nearer.
+    pub(super) fn nearer(&self, layout: &QuadLayout, quads: &QuadMesh, far: &[[f64; 2]], bound: f64) -> Self {
+        let most = self.farthest(layout, far);
+        let lines = self.of_chord.iter().zip(most).map(|(places, most)| {
+            let ends = || [0.0].into_iter().chain(places.iter().copied()).chain([1.0]);
+            let pieces = ends().zip(ends().skip(1)).zip(most);
+            pieces.map(|((a, b), far)| (b - a, (far / bound).sqrt().clamp(1.0, CLOSER))).collect::<Vec<(f64, f64)>>()
+        });
+        let pieces: Vec<Vec<(f64, f64)>> = lines.collect();
+        let count: Vec<f64> = pieces.iter().map(|p| p.iter().map(|piece| piece.1).sum()).collect();
+        let counts = rounded(layout, &count, quads.quads.len() as f64);
+        let of_chord = pieces.iter().zip(counts).map(|(pieces, n)| quantiles(pieces, n)).collect();
+        Self { of_chord, agrees: self.agrees.clone(), chord: self.chord.clone() }
+    }
+
+    /// For each chord and piece between its lines how far edges across it are from the surface at most.
+    fn farthest(&self, layout: &QuadLayout, far: &[[f64; 2]]) -> Vec<Vec<f64>> {
+        let mut most: Vec<Vec<f64>> = self.of_chord.iter().map(|lines| vec![0.0; lines.len() + 1]).collect();
+        let mut far = far.iter();
+        for patch in &layout.patches {
+            let [(c, along_c), (d, along_d)] = [0, 1].map(|i| {
+                let (arc, forward) = patch.sides[i];
+                (self.chord[arc as usize] as usize, self.agrees[arc as usize] == forward)
+            });
+            let (m, n) = (most[c].len(), most[d].len());
+            for (j, i) in (0..n).flat_map(|j| (0..m).map(move |i| (j, i))) {
+                let Some([across, up]) = far.next() else { continue };
+                let piece = &mut most[c][if along_c { i } else { m - 1 - i }];
+                *piece = piece.max(*across);
+                let piece = &mut most[d][if along_d { j } else { n - 1 - j }];
+                *piece = piece.max(*up);
+            }
+        }
+        most
     }
 
     /// The places of the lines along an arc, as shares of the whole from its first node on; from the second if it is not
@@ -144,6 +185,12 @@ fn counts(layout: &QuadLayout, cost: &[f64], all: f64) -> Vec<u32> {
         let sum: f64 = layout.patches.iter().map(chords).map(|[c, d]| count[c] * count[d]).sum();
         count.iter_mut().for_each(|n| *n = (*n * (all / sum).sqrt()).clamp(1.0, MOST));
     }
+    rounded(layout, &count, all)
+}
+
+/// Whole numbers of quads across all chords, in proportion to those given, that make about so many quads in `all`.
+fn rounded(layout: &QuadLayout, count: &[f64], all: f64) -> Vec<u32> {
+    let chords = |p: &Patch| [0, 1].map(|i| layout.arcs[p.sides[i].0 as usize].chord as usize);
     // Rounded they make another number in all; a common factor makes up for that.
     let rounded = |by: f64| count.iter().map(|n| ((n * by).round() as u32).max(FEWEST)).collect::<Vec<u32>>();
     let made = |by: f64| {
@@ -257,17 +304,24 @@ fn densities(parts: &[f64]) -> Vec<f64> {
     best.iter().map(|&d| if d > 0.0 { d.clamp(mean / EXTREME, mean * EXTREME) } else { mean }).collect()
 }
 
-/// The places that part a way into `n` of equal length, where lines are as dense in its parts as given.
-fn quantiles(density: &[f64], n: u32) -> Vec<f64> {
-    let total: f64 = density.iter().sum();
-    let (mut part, mut before) = (0, 0.0);
+/// Pieces of equal length with these densities.
+fn parts(density: &[f64]) -> Vec<(f64, f64)> {
+    density.iter().map(|&d| (1.0 / density.len() as f64, d)).collect()
+}
+
+/// The places that part a way into `n` of equal weight, where its pieces have these lengths, 1 in all, and weights.
+fn quantiles(pieces: &[(f64, f64)], n: u32) -> Vec<f64> {
+    let total: f64 = pieces.iter().map(|piece| piece.1).sum();
+    let (mut piece, mut start, mut before) = (0, 0.0, 0.0);
     let place = |i: u32| {
         let want = total * f64::from(i) / f64::from(n);
-        while part + 1 < density.len() && before + density[part] < want {
-            before += density[part];
-            part += 1;
+        while piece + 1 < pieces.len() && before + pieces[piece].1 < want {
+            start += pieces[piece].0;
+            before += pieces[piece].1;
+            piece += 1;
         }
-        (part as f64 + ((want - before) / density[part]).clamp(0.0, 1.0)) / density.len() as f64
+        let (length, weight) = pieces[piece];
+        start + length * ((want - before) / weight).clamp(0.0, 1.0)
     };
     (1..n).map(place).collect()
 }
@@ -295,9 +349,9 @@ mod tests {
 
     #[test]
     fn lines_are_dense_where_they_are_to_be() {
-        let places = quantiles(&[1.0, 1.0, 2.0, 4.0], 8);
+        let places = quantiles(&parts(&[1.0, 1.0, 2.0, 4.0]), 8);
         let expected = [0.25, 0.5, 0.625, 0.75, 0.8125, 0.875, 0.9375];
         assert!(places.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{places:?}");
-        assert!(quantiles(&[1.0; PARTS], 1).is_empty());
+        assert!(quantiles(&parts(&[1.0; PARTS]), 1).is_empty());
     }
 }

@@ -19,7 +19,7 @@ use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{Normalization, TriMesh, write_obj};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{QuadMesh, Stops, whole_counts};
+use crate::quad::{QuadMesh, Stops, near, whole_counts};
 use crate::weave::PinnedParts;
 
 /// How fine the quads are to be.
@@ -218,7 +218,8 @@ pub fn finish(
             QuadSize::Count(n) => f64::from(n),
         };
         let bend = |base: u32, along| second_form(&before.bending[base as usize], along, along).abs();
-        Stops::on_surface(&layout, &maps, bend, number)
+        let stops = Stops::on_surface(&layout, &maps, bend, number);
+        near(stops, (&layout, &embedding, &maps), surface.mesh, progress)?
     };
     let quads = quads(sketch, (&layout, &embedding, &maps), done, &stops, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());

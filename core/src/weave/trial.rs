@@ -1,8 +1,10 @@
 //! Strips under improvement, on the mesh that they are tried on: what could be changed, and what a change is worth.
 //!
 //! In each round a point is drawn at random, the likelier the more the layout deviates there from principal directions, and
-//! loops through it are candidates, of the elastica graph and of that of the smooth cross field. Some are tried beside the
+//! loops through it are candidates, of the elastica graph and of that of the smooth cross field. They are tried beside the
 //! strips that are there, in place of one that goes much the same way or of any other; and it is tried to leave one out.
+//! What splits a node often takes two strips that cross there, and what gives a knob its own nodes takes three, two across
+//! its head and one around its neck: so some are tried together, among them loops through a point not far off.
 
 use std::sync::Arc;
 
@@ -24,8 +26,12 @@ use crate::surface::{RelaxOptions, SurfaceCurve, relax};
 /// the cheapest are short, and it is not only those that are wanted.
 const LOOPS: usize = 4;
 const FOUND: usize = 16;
-/// Pairs of candidates that are tried together in a round: what splits a node often takes two strips that cross there.
-const PAIRS: usize = 3;
+/// How many pairs and how many threes of candidates are tried together in a round.
+const TOGETHER: [(usize, usize); 2] = [(2, 3), (3, 4)];
+/// How far the other point of a round is, on a surface of bounding-box diagonal 1, at most: about across a limb; and how often
+/// one is drawn.
+const NOT_FAR: f64 = 0.12;
+const DRAWS: usize = 20;
 /// Rings of triangles around a strip in which others count as going its way.
 const RINGS: usize = 2;
 /// By how much the price has to be less, in degrees, for a layout to be better.
@@ -109,8 +115,8 @@ impl Trial {
 
     /// Makes a change after which the layout fits better, or worse by no more than so much; tells whether there was one.
     pub(super) fn change(&mut self, tolerance: f64, progress: &Progress) -> Result<bool, WeaveError> {
-        let candidates = self.candidates(progress)?;
-        let changes = self.changes(&candidates);
+        let (candidates, through) = self.candidates(progress)?;
+        let changes = self.changes(&candidates, through);
         let drawn = self.fits(&changes, &candidates, 0, progress)?;
         let pairs = changes.into_iter().zip(drawn).filter_map(|(change, found)| Some((change, found?.0.price)));
         let mut hopeful: Vec<(Change, f64)> = pairs.filter(|(_, price)| *price < self.now.drawn + NEAR).collect();
@@ -169,9 +175,11 @@ impl Trial {
         self.now = self.best.clone();
     }
 
-    /// Loops through a point where the layout deviates from principal directions, smoothed.
-    fn candidates(&mut self, progress: &Progress) -> Result<Vec<Proposal>, WeaveError> {
+    /// Loops through a point where the layout deviates from principal directions, then such through one not far off, smoothed;
+    /// and how many the first are.
+    fn candidates(&mut self, progress: &Progress) -> Result<(Vec<Proposal>, usize), WeaveError> {
         let v = self.point();
+        let other = self.point_near(v);
         let model = &*self.model;
         let none = DirectionMask::none();
         let plain: Vec<Query> = std::iter::once((v, None)).chain(around(model, v)).collect();
@@ -180,8 +188,13 @@ impl Trial {
         while chosen.len() < LOOPS && !found.is_empty() {
             chosen.push(found.swap_remove(self.random.below(found.len())));
         }
+        let mut through = chosen.len();
         if let Some(guidance) = &self.guidance {
             chosen.extend(loops(&guidance.graph, &guidance.queries(v), &none, LOOPS, progress)?);
+            through = chosen.len();
+            if let Some(w) = other {
+                chosen.extend(loops(&guidance.graph, &guidance.queries(w), &none, LOOPS, progress)?);
+            }
         }
         let smooth = |p: Proposal| match relax(&model.mesh, &p.curve, &RelaxOptions::default(), progress) {
             Ok(relaxed) => p.relaxed(relaxed),
@@ -189,7 +202,7 @@ impl Trial {
         };
         let smoothed = chosen.into_par_iter().map(smooth).collect();
         progress.check()?;
-        Ok(smoothed)
+        Ok((smoothed, through))
     }
 
     /// A vertex at random, the likelier the more its triangles add to the deviation.
@@ -203,21 +216,30 @@ impl Trial {
         self.model.mesh.face_vertices(FaceId::new(face))[self.random.below(3)]
     }
 
-    /// What is to be tried in a round.
-    fn changes(&mut self, candidates: &[Proposal]) -> Vec<Change> {
+    /// Another such vertex not far off, if there is one.
+    fn point_near(&mut self, v: VertexId) -> Option<VertexId> {
+        let model = Arc::clone(&self.model);
+        let at = |v| model.mesh.position(v);
+        (0..DRAWS).map(|_| self.point()).find(|&w| w != v && at(w).distance(at(v)) < NOT_FAR)
+    }
+
+    /// What is to be tried in a round, with candidates of which the first so many go through its point.
+    fn changes(&mut self, candidates: &[Proposal], through: usize) -> Vec<Change> {
         let n = self.now.strips.len();
         let mut list = vec![Change { out: Some(self.random.below(n)), add: Vec::new() }];
         let beside: Vec<Vec<bool>> = self.now.curves().map(|c| self.beside(c)).collect();
-        for (c, candidate) in candidates.iter().enumerate() {
+        for (c, candidate) in candidates[..through].iter().enumerate() {
             let shared = |&i: &usize| self.passed(&candidate.curve).filter(|f| beside[i][f.index()]).count();
             let alike = (0..n).max_by_key(shared);
             list.push(Change { out: None, add: vec![c] });
             list.extend([alike, Some(self.random.below(n))].map(|out| Change { out, add: vec![c] }));
         }
-        for _ in 0..PAIRS {
-            let (a, b) = (self.random.below(candidates.len()), self.random.below(candidates.len()));
-            if a != b {
-                list.push(Change { out: None, add: vec![a, b] });
+        for (size, count) in TOGETHER {
+            for _ in 0..count {
+                let mut add: Vec<usize> = (0..size).map(|_| self.random.below(candidates.len())).collect();
+                add.sort_unstable();
+                add.dedup();
+                list.extend((add.len() == size).then_some(Change { out: None, add }));
             }
         }
         list

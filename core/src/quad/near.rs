@@ -1,0 +1,94 @@
+//! Lines of quads where the surface needs them: nowhere far from it.
+//!
+//! Lines that make edges short on average ([`super::Stops::on_surface`]) leave a few quads at tips and in hollows that are
+//! far from the surface, since a line there runs along a whole strip. Yet it is these that are seen. So the refinement is
+//! measured, lines become denser where its edges are farthest from the surface and fewer elsewhere, and again; the lines
+//! are taken with which the farthest edge is nearest.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::ground::Ground;
+use super::refine::{QuadMesh, refine};
+use super::smooth::land;
+use super::stops::Stops;
+use crate::layout::{Embedding, PatchMap, QuadLayout};
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Progress};
+
+/// How often lines are placed anew.
+const ROUNDS: usize = 8;
+/// Edges farther from the surface than this share of the farthest are to come nearer.
+const SHARE: f64 = 0.6;
+
+/// Lines with which no edge is far from the surface, made from others; about as many quads as with these.
+///
+/// # Errors
+///
+/// When cancelled.
+pub fn near(
+    mut stops: Stops,
+    (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
+    base: &TriMesh,
+    progress: &Progress,
+) -> Result<Stops, Cancelled> {
+    let ground = Ground::new(base);
+    let mut best: Option<(f64, Stops)> = None;
+    for round in 0..=ROUNDS {
+        progress.check()?;
+        let mut quads = refine(layout, embedding, maps, &stops);
+        land(&mut quads, base);
+        let far: Vec<[f64; 2]> = quads.quads.par_iter().map(|q| distances(&quads, q, &ground)).collect();
+        let most = far.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+        tracing::debug!(round, most, quads = quads.quads.len(), "farthest edge");
+        let next = stops.nearer(layout, &quads, &far, SHARE * most);
+        let now = std::mem::replace(&mut stops, next);
+        if best.as_ref().is_none_or(|b| most < b.0) {
+            best = Some((most, now));
+        }
+    }
+    Ok(best.map_or(stops, |b| b.1))
+}
+
+/// How far the edges of a quad along either side are from the surface, in their middle. Of how far its own middle is each
+/// has a half.
+fn distances(mesh: &QuadMesh, quad: &[u32; 4], ground: &Ground<'_>) -> [f64; 2] {
+    let at = |i: usize| mesh.positions[quad[i] as usize];
+    let far = |p: DVec3, near: usize| p.distance(ground.follow(p, mesh.base_face[quad[near] as usize]).0);
+    let edge = |i: usize, j: usize| far(0.5 * (at(i) + at(j)), i);
+    let middle = 0.5 * far(0.25 * (at(0) + at(1) + at(2) + at(3)), 0);
+    [edge(0, 1).max(edge(3, 2)).max(middle), edge(1, 2).max(edge(0, 3)).max(middle)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dual::Arrangement;
+    use crate::layout::{embed, map_patches};
+    use crate::testing::{column, grid, row};
+
+    #[test]
+    fn lines_gather_where_a_narrow_hill_would_be_cut_off() {
+        let hill = |u: f64, v: f64| (-((u - 0.3).powi(2) + (v - 0.6).powi(2)) / 0.003).exp();
+        let mesh = grid(48, 48, [false, false], |u, v| DVec3::new(u, v, 0.1 * hill(u, v)));
+        let curves = [row(48, 12, false, 0.5), column(48, 48, 13, false, 0.5)];
+        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
+        let layout = QuadLayout::dual(&arrangement, &[], mesh.euler_characteristic()).unwrap();
+        let progress = Progress::new();
+        let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
+        let maps = map_patches(&layout, &embedding, &progress).unwrap();
+        let drawn = (&layout, &embedding, &maps[..]);
+        let ground = Ground::new(&mesh);
+        let farthest = |stops: &Stops| {
+            let mut quads = refine(&layout, &embedding, &maps, stops);
+            land(&mut quads, &mesh);
+            let far = quads.quads.iter().flat_map(|q| distances(&quads, q, &ground)).fold(0.0, f64::max);
+            (far, quads.quads.len() as f64)
+        };
+        let first = Stops::on_surface(&layout, &maps, |_, _| 0.0, 300.0);
+        let ((before, n), (after, m)) =
+            (farthest(&first), farthest(&near(first, drawn, &mesh, &progress).unwrap()));
+        assert!(after < 0.7 * before, "{before} {after}");
+        assert!((m / n - 1.0).abs() < 0.05, "{n} {m}");
+    }
+}

@@ -26,6 +26,8 @@ pub struct Foreseen {
     /// Its conformal distortion, as [`Measures::conformal`](super::Measures::conformal), but of no triangle more than it
     /// can be made: what folds here will be squeezed.
     pub conformal: f64,
+    /// The share of triangles that are folded: what does not go away when nodes move can hardly be unfolded.
+    pub folded: f64,
     /// What each triangle of the surface adds to the deviation.
     pub shares: Vec<f64>,
 }
@@ -57,7 +59,8 @@ pub fn foresee(job: &Job<'_>, steps: usize, progress: &Progress) -> Result<Fores
     for (t, base) in triangles.iter().zip(&net.base_face) {
         shares[base.index()] += t.area * t.anisotropy * t.deviation / weight;
     }
-    Ok(Foreseen { alignment: shares.iter().sum(), conformal, shares })
+    let folded = optimizer.state().flipped() as f64 / mesh.n_faces() as f64;
+    Ok(Foreseen { alignment: shares.iter().sum(), conformal, folded, shares })
 }
 
 #[cfg(test)]

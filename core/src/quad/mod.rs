@@ -10,7 +10,7 @@ mod smooth;
 mod stops;
 mod worst;
 
-pub use near::near;
+pub use near::{farthest, near};
 pub use refine::{QuadMesh, refine};
 pub use smooth::{land, quality, scaled_jacobians, smooth};
 pub use stops::{Stops, whole_counts};

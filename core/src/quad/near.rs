@@ -38,7 +38,7 @@ pub fn near(
         progress.check()?;
         let mut quads = refine(layout, embedding, maps, &stops);
         land(&mut quads, base);
-        let far: Vec<[f64; 2]> = quads.quads.par_iter().map(|q| distances(&quads, q, &ground)).collect();
+        let far: Vec<[f64; 2]> = quads.quads.par_iter().map(|q| Distances::of(&quads, q, &ground).sides()).collect();
         let most = far.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         tracing::debug!(round, most, quads = quads.quads.len(), "farthest edge");
         let next = stops.nearer(layout, &quads, &far, SHARE * most);
@@ -50,14 +50,38 @@ pub fn near(
     Ok(best.map_or(stops, |b| b.1))
 }
 
-/// How far the edges of a quad along either side are from the surface, in their middle. Of how far its own middle is each
-/// has a half.
-fn distances(mesh: &QuadMesh, quad: &[u32; 4], ground: &Ground<'_>) -> [f64; 2] {
-    let at = |i: usize| mesh.positions[quad[i] as usize];
-    let far = |p: DVec3, near: usize| p.distance(ground.follow(p, mesh.base_face[quad[near] as usize]).0);
-    let edge = |i: usize, j: usize| far(0.5 * (at(i) + at(j)), i);
-    let middle = 0.5 * far(0.25 * (at(0) + at(1) + at(2) + at(3)), 0);
-    [edge(0, 1).max(edge(3, 2)).max(middle), edge(1, 2).max(edge(0, 3)).max(middle)]
+/// How far the quads of a mesh on `base` are from it at most, by the middles of quads and edges.
+pub fn farthest(mesh: &QuadMesh, base: &TriMesh) -> f64 {
+    let ground = Ground::new(base);
+    mesh.quads.par_iter().map(|q| Distances::of(mesh, q, &ground).most()).reduce(|| 0.0, f64::max)
+}
+
+/// How far a quad is from the surface.
+struct Distances {
+    /// In the middle of its edges.
+    edges: [f64; 4],
+    /// In its own middle.
+    middle: f64,
+}
+
+impl Distances {
+    fn of(mesh: &QuadMesh, quad: &[u32; 4], ground: &Ground<'_>) -> Self {
+        let at = |i: usize| mesh.positions[quad[i % 4] as usize];
+        let far = |p: DVec3, near: usize| p.distance(ground.follow(p, mesh.base_face[quad[near] as usize]).0);
+        Self {
+            edges: std::array::from_fn(|i| far(0.5 * (at(i) + at(i + 1)), i)),
+            middle: far(0.25 * (at(0) + at(1) + at(2) + at(3)), 0),
+        }
+    }
+
+    /// What lines across either side can make less. Of how far its middle is each has a half.
+    fn sides(&self) -> [f64; 2] {
+        [0, 1].map(|i| self.edges[i].max(self.edges[i + 2]).max(0.5 * self.middle))
+    }
+
+    fn most(&self) -> f64 {
+        self.edges.iter().fold(self.middle, |a, &b| a.max(b))
+    }
 }
 
 #[cfg(test)]
@@ -78,12 +102,10 @@ mod tests {
         let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
         let maps = map_patches(&layout, &embedding, &progress).unwrap();
         let drawn = (&layout, &embedding, &maps[..]);
-        let ground = Ground::new(&mesh);
         let farthest = |stops: &Stops| {
             let mut quads = refine(&layout, &embedding, &maps, stops);
             land(&mut quads, &mesh);
-            let far = quads.quads.iter().flat_map(|q| distances(&quads, q, &ground)).fold(0.0, f64::max);
-            (far, quads.quads.len() as f64)
+            (farthest(&quads, &mesh), quads.quads.len() as f64)
         };
         let first = Stops::on_surface(&layout, &maps, |_, _| 0.0, 300.0);
         let ((before, n), (after, m)) =

@@ -17,6 +17,9 @@ use crate::surface::SurfaceCurve;
 const PATCH: f64 = 0.005;
 /// What conformal distortion is worth, likewise: a tenth more or less of it shows as much as half a degree.
 const DISTORTION: f64 = 6.0;
+/// What triangles that fold are worth, likewise: of 6000 some 50 more or less, beyond which maps of least squares cannot be
+/// unfolded, as much as a degree.
+const FOLDS: f64 = 120.0;
 /// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
 const QUARTER: f64 = 0.01;
 /// What a node is worth that cannot be embedded well: of two patches or of more than six.
@@ -30,6 +33,8 @@ pub struct Fit {
     pub alignment: f64,
     /// The mean conformal distortion that is foreseen.
     pub conformal: f64,
+    /// The share of triangles that are foreseen to fold before they are made not to.
+    pub folded: f64,
     /// Number of patches.
     pub patches: usize,
     /// Number of irregular nodes.
@@ -74,12 +79,14 @@ pub(super) fn fit(
     let patches = layout.patches.len();
     let price = foreseen.alignment
         + DISTORTION * (foreseen.conformal - 2.0)
+        + FOLDS * foreseen.folded
         + PATCH * patches as f64
         + QUARTER * f64::from(quarters)
         + EXTREME * extreme as f64;
     let fit = Fit {
         alignment: foreseen.alignment,
         conformal: foreseen.conformal,
+        folded: foreseen.folded,
         patches,
         irregular: layout.n_irregular(),
         price,

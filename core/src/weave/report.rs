@@ -16,7 +16,7 @@ use crate::dual::{Colour, RegionReport};
 use crate::embed::{CollapsedChord, FeatureEdges, Measures, ShortChord, Surface, face_curvature, measure_patches};
 use crate::layout::{Embedding, PatchMap};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
-use crate::quad::quality;
+use crate::quad::{farthest, quality};
 use crate::surface::PrincipalCurvature;
 
 /// Seconds by the name of what took them.
@@ -112,6 +112,8 @@ struct LayoutReport {
     quads: usize,
     folded_quads: usize,
     mean_scaled_jacobian: f64,
+    /// How far quads are from the surface at most, as a fraction of the diagonal of its bounding box.
+    farthest_quad: f64,
     flipped_triangles: usize,
     embedding: EmbeddingSection,
     checks: Checks,
@@ -258,6 +260,7 @@ fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
         quads: e.quads.quads.len(),
         folded_quads,
         mean_scaled_jacobian,
+        farthest_quad: farthest(&e.quads, &loaded.mesh),
         flipped_triangles,
         embedding: embedding_section(e, loaded),
         checks,

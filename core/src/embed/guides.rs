@@ -141,6 +141,27 @@ mod tests {
     }
 
     #[test]
+    fn guides_are_stronger_once_the_map_cannot_fold_but_not_where_creases_carry_the_shape() {
+        let tube = grid(60, 50, [true, false], |u, v| DVec3::new(0.1 * (TAU * u).cos(), 0.1 * (TAU * u).sin(), 0.8 * v));
+        let (metric, none) = (Metric::new(&tube), vec![false; tube.n_edges()]);
+        let curvature = principal_curvature(&tube, 0.03, &none);
+        let weight = |sharp: &[bool], whole| {
+            shape_guides(&tube, &metric, &curvature, sharp, whole).iter().map(|g| g.weight).sum::<f64>()
+        };
+        let stronger = (STRENGTH_WHOLE / STRENGTH).powi(2);
+        assert!((weight(&none, true) / weight(&none, false) / stronger - 1.0).abs() < 1e-9);
+        // Every fifth ring of edges all around: ten times the circumference.
+        let sharp: Vec<bool> = tube
+            .edges()
+            .map(|e| {
+                let [a, b] = tube.edge_vertices(e).map(|v| tube.position(v).z / 0.8 * 50.0);
+                (a - b).abs() < 1e-6 && (a.round() as u32).is_multiple_of(5)
+            })
+            .collect();
+        assert_eq!(weight(&sharp, true), weight(&sharp, false));
+    }
+
+    #[test]
     fn features_guide_the_triangles_beside_them() {
         let mesh = square(3);
         let metric = Metric::new(&mesh);

@@ -22,9 +22,10 @@ const DISTORTION: f64 = 6.0;
 const FOLDS: f64 = 120.0;
 /// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
 const QUARTER: f64 = 0.01;
-/// What a node is worth that cannot be embedded well: of two patches or of more than six.
+/// What a quarter of index is worth beyond those with which a node can be embedded well and has quads of good angles: of three
+/// to six patches.
 const EXTREME: f64 = 0.5;
-const USUAL: std::ops::RangeInclusive<i32> = -2..=1;
+const USUAL: [i32; 2] = [-2, 1];
 
 /// How well a layout fits the shape.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -75,14 +76,15 @@ pub(super) fn fit(
     let foreseen = foresee(&job, steps, progress)?;
     let index = |n: &crate::layout::Node| (if n.boundary { 2 } else { 4 }) - n.valence as i32;
     let quarters: i32 = layout.nodes.iter().map(|n| index(n).abs()).sum();
-    let extreme = layout.nodes.iter().filter(|n| !USUAL.contains(&index(n))).count();
+    let beyond = |i: i32| (i - i.clamp(USUAL[0], USUAL[1])).abs();
+    let extreme: i32 = layout.nodes.iter().map(|n| beyond(index(n))).sum();
     let patches = layout.patches.len();
     let price = foreseen.alignment
         + DISTORTION * (foreseen.conformal - 2.0)
         + FOLDS * foreseen.folded
         + PATCH * patches as f64
         + QUARTER * f64::from(quarters)
-        + EXTREME * extreme as f64;
+        + EXTREME * f64::from(extreme);
     let fit = Fit {
         alignment: foreseen.alignment,
         conformal: foreseen.conformal,

@@ -29,9 +29,11 @@ use crate::surface::{RelaxOptions, relax};
 pub const ROUNDS: usize = 200;
 /// Rounds in a row without a change after which no better layout is expected.
 const IDLE: usize = 40;
-/// Triangles of the mesh that layouts are tried on, and how many times as many a mesh has that is given such a proxy.
+/// Triangles of the mesh that layouts are tried on, and how many times as many a mesh has that is given such a proxy; by what
+/// factor there are more where the strips do not fit it.
 const ROUGH: u32 = 6000;
 const WORTH: usize = 2;
+const FINER: u32 = 2;
 /// By how much the price may rise in a round at first, in degrees: about what a strip is worth that is of no use yet. It
 /// falls to nothing.
 const TOLERANCE: f64 = 0.3;
@@ -113,19 +115,18 @@ impl Session {
         Ok(improvement)
     }
 
-    /// This session on a proxy, if that is worth while and the strips fit it.
+    /// This session on a proxy, if that is worth while: the smallest that the strips fit.
     fn rough(&self, progress: &Progress) -> Result<Option<Self>, WeaveError> {
-        if self.model().mesh.n_faces() <= WORTH * ROUGH as usize {
-            return Ok(None);
-        }
-        match self.with_options(Options { proxy: ROUGH, ..self.model().options }, progress) {
-            Ok(session) => Ok(Some(session)),
-            Err(WeaveError::Cancelled(cancelled)) => Err(cancelled.into()),
-            Err(error) => {
-                tracing::debug!(%error, "improved without a proxy");
-                Ok(None)
+        let mut proxy = ROUGH;
+        while self.model().mesh.n_faces() > WORTH * proxy as usize {
+            match self.with_options(Options { proxy, ..self.model().options }, progress) {
+                Ok(session) => return Ok(Some(session)),
+                Err(WeaveError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(error) => tracing::debug!(%error, proxy, "not improved on a proxy"),
             }
+            proxy *= FINER;
         }
+        Ok(None)
     }
 
     /// The strips of a trial as strips of this session; `None` if they do not make the same layout on its mesh as on that

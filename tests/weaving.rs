@@ -206,6 +206,34 @@ fn steps_are_taken_back_and_made_again() {
 }
 
 #[test]
+fn a_script_goes_on_with_a_saved_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let weave = |script: &Path, name: &str| {
+        let out = folder.path().join(name);
+        let output = plait(&["weave", text(script), "--no-optimise", "--out", text(&out)]);
+        assert!(output.status.success(), "{name}: {}", errors(&output));
+        out.join("design.plait")
+    };
+    let first = weave(&torus_script(folder.path(), &format!("{MERIDIAN}, {EQUATOR}")), "first");
+    let again = folder.path().join("again.json");
+    let history = format!(r#"{{"delete": 0}}, {MERIDIAN}"#);
+    std::fs::write(&again, format!(r#"{{"mesh": "first/design.plait", "steps": [{history}]}}"#)).unwrap();
+    let at_once = weave(&torus_script(folder.path(), &format!("{MERIDIAN}, {EQUATOR}, {history}")), "at-once");
+    let strips = |path: &Path| {
+        let design: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        let curves = design["strips"].as_array().unwrap().iter().map(|s| s["curve"].clone());
+        curves.collect::<Vec<_>>()
+    };
+    assert_eq!(strips(&weave(&again, "again")), strips(&at_once));
+    assert_ne!(strips(&at_once), strips(&first));
+    // What is no design is refused by its name.
+    std::fs::write(folder.path().join("none.plait"), "{}").unwrap();
+    std::fs::write(&again, r#"{"mesh": "none.plait", "steps": []}"#).unwrap();
+    let output = plait(&["weave", text(&again), "--out", text(folder.path())]);
+    assert!(!output.status.success() && errors(&output).contains("none.plait is not a Plait design"));
+}
+
+#[test]
 fn other_strips_are_tried_by_a_script_and_by_the_command_line_alike() {
     let folder = tempfile::tempdir().unwrap();
     let [scripted, asked] = ["scripted", "asked"].map(|n| folder.path().join(n));

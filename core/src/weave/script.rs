@@ -1,7 +1,8 @@
 //! Weave scripts: a designer's steps in a file, replayed without a window.
 //!
 //! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`.
-//! Points are in the file's coordinates and snap to the nearest point of the surface.
+//! Points are in the file's coordinates and snap to the nearest point of the surface. In place of a mesh there may be a
+//! saved design, with which the designer goes on.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::design::{Design, DesignError};
 use super::model::Options;
 use super::proposal::Proposal;
 use super::session::{Session, WeaveError};
@@ -43,9 +45,9 @@ pub enum Step {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Script {
-    /// Name of a built-in model, or path of a mesh relative to the script.
+    /// Name of a built-in model, or path of a mesh or of a design relative to the script.
     pub mesh: String,
-    /// The options; the usual ones if left out.
+    /// The options; the usual ones if left out. A design brings its own.
     #[serde(default)]
     pub options: Options,
     /// The steps in order.
@@ -74,6 +76,9 @@ pub enum ScriptError {
     /// The mesh could not be read.
     #[error(transparent)]
     Mesh(#[from] LoadError),
+    /// The design could not be read.
+    #[error(transparent)]
+    Design(#[from] DesignError),
     /// A step failed.
     #[error("step {step}: {source}")]
     Step {
@@ -111,6 +116,26 @@ impl Script {
 ///
 /// The first step that fails or makes no sense.
 pub fn replay(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, ScriptError> {
+    let mut session = open(script, folder, progress)?;
+    let mut shown = Shown::default();
+    for (i, step) in script.steps.iter().enumerate() {
+        shown.take(step, &mut session, progress).map_err(|e| match e {
+            StepError::Weave(source) => ScriptError::Step { step: i + 1, source },
+            StepError::Senseless(reason) => ScriptError::Senseless { step: i + 1, reason },
+        })?;
+    }
+    Ok(session)
+}
+
+/// The session that a script begins with.
+fn open(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, ScriptError> {
+    let opening = |source| ScriptError::Step { step: 0, source: Box::new(source) };
+    let path = folder.join(&script.mesh);
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("plait")) {
+        let design = Design::read(&path)?;
+        let loaded = design.mesh.load(path.parent().unwrap_or(folder))?;
+        return Session::resume(loaded, design, progress).map_err(opening);
+    }
     let source = MeshSource::from_name(&script.mesh);
     let loaded = source.load(folder)?;
     let source = match source {
@@ -120,16 +145,7 @@ pub fn replay(script: &Script, folder: &Path, progress: &Progress) -> Result<Ses
         }
         builtin @ MeshSource::Builtin(_) => builtin,
     };
-    let mut session = Session::open(loaded, source, script.options, progress)
-        .map_err(|source| ScriptError::Step { step: 0, source: Box::new(source) })?;
-    let mut shown = Shown::default();
-    for (i, step) in script.steps.iter().enumerate() {
-        shown.take(step, &mut session, progress).map_err(|e| match e {
-            StepError::Weave(source) => ScriptError::Step { step: i + 1, source },
-            StepError::Senseless(reason) => ScriptError::Senseless { step: i + 1, reason },
-        })?;
-    }
-    Ok(session)
+    Session::open(loaded, source, script.options, progress).map_err(opening)
 }
 
 /// The proposals on show and the one picked.

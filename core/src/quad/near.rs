@@ -15,9 +15,12 @@ use super::stops::Stops;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
+use crate::surface::SurfaceIndex;
 
 /// How often lines are placed anew.
 const ROUNDS: usize = 8;
+/// Vertices of the surface that are looked at, at most.
+const LOOKED_AT: usize = 20_000;
 /// Edges farther from the surface than this share of the farthest are to come nearer.
 const SHARE: f64 = 0.6;
 
@@ -34,14 +37,18 @@ pub fn near(
 ) -> Result<Stops, Cancelled> {
     let ground = Ground::new(base);
     let mut best: Option<(f64, Stops)> = None;
+    let mut wanted = None;
     for round in 0..=ROUNDS {
         progress.check()?;
         let mut quads = refine(layout, embedding, maps, &stops);
         land(&mut quads, base);
-        let far: Vec<[f64; 2]> = quads.quads.par_iter().map(|q| Distances::of(&quads, q, &ground).sides()).collect();
+        let missed = missed(&quads, base);
+        let each = quads.quads.par_iter().zip(missed);
+        let far: Vec<[f64; 2]> = each.map(|(q, missed)| Distances::of(&quads, q, &ground).sides(missed)).collect();
         let most = far.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         tracing::debug!(round, most, quads = quads.quads.len(), "farthest edge");
-        let next = stops.nearer(layout, &quads, &far, SHARE * most);
+        let wanted = *wanted.get_or_insert(quads.quads.len() as f64);
+        let next = stops.nearer(layout, &far, SHARE * most, wanted);
         let now = std::mem::replace(&mut stops, next);
         if best.as_ref().is_none_or(|b| most < b.0) {
             best = Some((most, now));
@@ -50,10 +57,36 @@ pub fn near(
     Ok(best.map_or(stops, |b| b.1))
 }
 
-/// How far the quads of a mesh on `base` are from it at most, by the middles of quads and edges.
+/// How far the quads of a mesh on `base` are from it at most, by the middles of quads and edges and by the vertices of the
+/// surface.
 pub fn farthest(mesh: &QuadMesh, base: &TriMesh) -> f64 {
     let ground = Ground::new(base);
-    mesh.quads.par_iter().map(|q| Distances::of(mesh, q, &ground).most()).reduce(|| 0.0, f64::max)
+    let far = mesh.quads.par_iter().map(|q| Distances::of(mesh, q, &ground).most()).reduce(|| 0.0, f64::max);
+    missed(mesh, base).into_iter().fold(far, f64::max)
+}
+
+/// For each quad how far vertices of the surface are from it at most that are nearest to it: a tip that pokes through it, or a
+/// crease. Of a large mesh as many are looked at as tell.
+fn missed(mesh: &QuadMesh, base: &TriMesh) -> Vec<f64> {
+    let mut far = vec![0.0; mesh.quads.len()];
+    let halves = |&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]];
+    let triangles: Vec<[u32; 3]> = mesh.quads.iter().flat_map(halves).collect();
+    // What is no manifold has no quads that are near anything.
+    let Ok(surface) = TriMesh::from_faces(mesh.positions.clone(), &triangles) else { return far };
+    let index = SurfaceIndex::new(&surface);
+    let step = base.n_vertices().div_ceil(LOOKED_AT).max(1);
+    let places: Vec<DVec3> = base.vertices().step_by(step).map(|v| base.position(v)).collect();
+    let found: Vec<(usize, f64)> = places
+        .par_iter()
+        .map(|&p| {
+            let nearest = index.nearest(p);
+            (nearest.face.index() / 2, nearest.position(&surface).distance(p))
+        })
+        .collect();
+    for (q, distance) in found {
+        far[q] = f64::max(far[q], distance);
+    }
+    far
 }
 
 /// How far a quad is from the surface.
@@ -74,9 +107,10 @@ impl Distances {
         }
     }
 
-    /// What lines across either side can make less. Of how far its middle is each has a half.
-    fn sides(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.edges[i].max(self.edges[i + 2]).max(0.5 * self.middle))
+    /// What lines across either side can make less. Of how far its middle is each has a half, and of how far it misses the
+    /// surface.
+    fn sides(&self, missed: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.edges[i].max(self.edges[i + 2]).max(0.5 * self.middle.max(missed)))
     }
 
     fn most(&self) -> f64 {
@@ -108,8 +142,7 @@ mod tests {
             (farthest(&quads, &mesh), quads.quads.len() as f64)
         };
         let first = Stops::on_surface(&layout, &maps, |_, _| 0.0, 300.0);
-        let ((before, n), (after, m)) =
-            (farthest(&first), farthest(&near(first, drawn, &mesh, &progress).unwrap()));
+        let ((before, n), (after, m)) = (farthest(&first), farthest(&near(first, drawn, &mesh, &progress).unwrap()));
         assert!(after < 0.7 * before, "{before} {after}");
         assert!((m / n - 1.0).abs() < 0.05, "{n} {m}");
     }

@@ -11,7 +11,6 @@
 
 use glam::DVec3;
 
-use super::refine::QuadMesh;
 use crate::layout::{Patch, PatchMap, QuadLayout};
 use crate::mesh::FaceId;
 
@@ -74,10 +73,10 @@ impl Stops {
         }
     }
 
-    /// These lines with others between where edges across are far from the surface, and fewer elsewhere: about as many quads
-    /// in all as there are. `quads` are their refinement, and `far` tells of each how far its edges along either side are
-    /// from the surface; those farther than `bound` are to come nearer.
-    pub(super) fn nearer(&self, layout: &QuadLayout, quads: &QuadMesh, far: &[[f64; 2]], bound: f64) -> Self {
+    /// These lines with others between where edges across are far from the surface, and fewer elsewhere: about so many quads
+    /// in `all`. For each quad of their refinement `far` tells how far its edges along either side are from the surface;
+    /// those farther than `bound` are to come nearer.
+    pub(super) fn nearer(&self, layout: &QuadLayout, far: &[[f64; 2]], bound: f64, all: f64) -> Self {
         let most = self.farthest(layout, far);
         let lines = self.of_chord.iter().zip(most).map(|(places, most)| {
             let ends = || [0.0].into_iter().chain(places.iter().copied()).chain([1.0]);
@@ -86,7 +85,7 @@ impl Stops {
         });
         let pieces: Vec<Vec<(f64, f64)>> = lines.collect();
         let count: Vec<f64> = pieces.iter().map(|p| p.iter().map(|piece| piece.1).sum()).collect();
-        let counts = rounded(layout, &count, quads.quads.len() as f64);
+        let counts = rounded(layout, &count, all);
         let of_chord = pieces.iter().zip(counts).map(|(pieces, n)| quantiles(pieces, n)).collect();
         Self { of_chord, agrees: self.agrees.clone(), chord: self.chord.clone() }
     }

@@ -57,7 +57,9 @@ impl SeamlessSystem {
             let Some(share) = self.search(&minding, &mut at, &direction, slope) else { return Ok(None) };
             let left = folds(&at.map.uv).len();
             tracing::debug!(step, share, left, "untangled");
-            if step % 29 == 0 || left < 3 { debug_winds(mesh, &at.map.uv, quarters); }
+            if step % 29 == 0 || left < 3 {
+                debug_winds(mesh, &at.map.uv, quarters);
+            }
             if left == 0
                 && let Some(done) = self.injective(energy, at.free.clone())
             {
@@ -79,14 +81,19 @@ fn debug_winds(mesh: &TriMesh, uv: &[[DVec2; 3]], quarters: &[u32]) {
     let mut n = vec![0; mesh.n_vertices()];
     for f in mesh.faces() {
         let corner = |k: usize| uv[f.index()][k % 3];
-        let turned = (corner(1)-corner(0)).perp_dot(corner(2)-corner(0)) <= 0.0;
+        let turned = (corner(1) - corner(0)).perp_dot(corner(2) - corner(0)) <= 0.0;
         for (k, v) in mesh.face_vertices(f).into_iter().enumerate() {
             angle[v.index()] += (corner(k + 1) - corner(k)).angle_to(corner(k + 2) - corner(k));
             n[v.index()] += 1;
-            if turned { neg[v.index()] += 1; }
+            if turned {
+                neg[v.index()] += 1;
+            }
         }
     }
-    let list: Vec<_> = (0..mesh.n_vertices()).filter(|&v| neg[v] > 0 || (quarters[v] != 0 && (angle[v]/FRAC_PI_2 - f64::from(quarters[v])).abs() > 0.5)).map(|v| (v, quarters[v], (angle[v]/FRAC_PI_2*100.0).round()/100.0, neg[v], n[v])).collect();
+    let list: Vec<_> = (0..mesh.n_vertices())
+        .filter(|&v| neg[v] > 0 || (quarters[v] != 0 && (angle[v] / FRAC_PI_2 - f64::from(quarters[v])).abs() > 0.5))
+        .map(|v| (v, quarters[v], (angle[v] / FRAC_PI_2 * 100.0).round() / 100.0, neg[v], n[v]))
+        .collect();
     tracing::debug!(n = list.len(), ?list, "winding");
 }
 

@@ -53,6 +53,53 @@ fn the_embedding_of_a_woven_layout_improves_without_folds() {
     }
 }
 
+/// The figures of docs/benchmarks.md, with room for what rounding changes: nodes take other ways with it.
+#[test]
+fn layouts_are_embedded_without_folds_with_little_distortion_along_principal_directions() {
+    if support::meshes().is_none() {
+        return;
+    }
+    let design = |name: &str| root().join("tests/designs").join(name).with_extension("plait");
+    for (input, conformal, alignment) in [
+        (script("cino_3holes"), 2.045, 3.2),
+        (script("c3d_rocker-arm"), 2.068, 5.0),
+        (script("fertility_28k"), 2.06, 4.1),
+        (script("elephant_12k"), 2.14, 6.5),
+        (design("botijo"), 2.075, 3.8),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let report = embed(&input, folder.path(), &["--quiet"]);
+        let embedding = &report["layout"]["embedding"];
+        assert_eq!((&embedding["flipped"], &embedding["folds"]), (&json!(0), &json!([])), "{input:?}");
+        let [c, a] = ["conformal", "alignment"].map(|name| number(embedding, name));
+        assert!(c < conformal && a < alignment, "{input:?}: {c} {a}");
+    }
+}
+
+#[test]
+fn quads_of_the_embedding_are_better_than_those_of_the_drawing() {
+    let Some(meshes) = support::meshes() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (name, mesh) in [("fertility_28k", "fertility_28k.obj"), ("elephant_12k", "elephant_12k.obj")] {
+        let [drawn, embedded] = [("drawn", &["--no-optimise"][..]), ("embedded", &[])].map(|(kind, more)| {
+            let out = folder.path().join(name).join(kind);
+            let output = plait(&[&["weave", text(&script(name)), "--out", text(&out)], more].concat());
+            assert!(output.status.success(), "{name}: {}", errors(&output));
+            let check = support::independent_check(&out.join("quads.obj"), &meshes.join(mesh));
+            (json_file(&out.join("report.json")), check)
+        });
+        let [far, near] = [&drawn, &embedded].map(|(report, _)| number(&report["layout"], "farthest_quad"));
+        assert!(near < far, "{name}: {far} {near}");
+        let (Some(before), Some(after)) = (drawn.1, embedded.1) else { continue };
+        for figure in ["scaled_jacobian_min", "scaled_jacobian_mean"] {
+            assert!(number(&after, figure) > number(&before, figure), "{name}: {figure} {before} {after}");
+        }
+        for figure in ["angle_std_deg", "distance_mean", "distance_max"] {
+            assert!(number(&after, figure) < number(&before, figure), "{name}: {figure} {before} {after}");
+        }
+    }
+}
+
 #[test]
 fn features_are_isolines_exactly() {
     if support::meshes().is_none() {

@@ -1,9 +1,7 @@
 //! The course of an optimisation: nodes move, folds go, arcs are traced and patches cut out.
 //!
 //! Least squares come first: their steps are cheap and find where features can be held. What they end with, untangled if it
-//! folds, is where maps that never fold go on from. To hold regular nodes on their isolines may fold a map that is all but
-//! good: then they go on from where nodes came to rest, with regular nodes free. Where that cannot be untangled either they
-//! start from the drawing.
+//! folds, is where maps that never fold go on from; where it cannot be untangled these start from the drawing.
 
 use super::descent::Optimizer;
 use super::job::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Settings, Snapshot};
@@ -90,7 +88,6 @@ impl<'w> Course<'w> {
         let flipped_at_rest = optimizer.state().flipped();
         let Settings { integer, .. } = job.settings;
         let complete = !job.layout.patches.is_empty();
-        let rest = (optimizer.state().clone(), optimizer.sharp.clone(), optimizer.curvature.clone());
         let found = if optimizer.is_hopeless() && complete && integer.is_none() {
             Err(EmbeddingError::Folded)
         } else {
@@ -109,12 +106,7 @@ impl<'w> Course<'w> {
                     (Err(_), Ok(done)) if is_whole(&done) => done,
                     (Err(error), found) => {
                         tracing::debug!(%error, "no map without folds near that of least squares");
-                        let start = Optimizer::from_rest(job, rest, progress);
-                        match self.without_folds(job, start, progress) {
-                            Ok(done) => done,
-                            Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
-                            Err(_) => self.drawing_unfolded(job, found, progress)?,
-                        }
+                        self.drawing_unfolded(job, found, progress)?
                     }
                 }
             }

@@ -45,8 +45,6 @@ const TURNED_RINGS: usize = 2;
 
 /// A net with what is known of its mesh: sharp edges, and curvature at the vertices.
 pub(super) type Known = (Net, Vec<bool>, Vec<PrincipalCurvature>);
-/// A state with what is known of its mesh.
-pub(super) type Parts = (State, Vec<bool>, Vec<PrincipalCurvature>);
 
 /// An embedding under optimisation.
 pub struct Optimizer<'a> {
@@ -125,10 +123,8 @@ impl<'a> Optimizer<'a> {
         let mut roads = Crossroads::new(layout, |i| held[i]);
         let shape = match aim {
             Aim::LeastSquares => None,
-            Aim::Injective { shape, start, .. } => {
-                if !matches!(start, Start::Loose(_)) {
-                    roads.hold_all();
-                }
+            Aim::Injective { shape, .. } => {
+                roads.hold_all();
                 Some(shape)
             }
         };

@@ -1,12 +1,13 @@
 //! The end of an optimisation: all nodes on their isolines, and no folds.
 
 use super::EmbeddingError;
-use super::descent::{HOPELESS, Optimizer, Parts};
+use super::descent::{HOPELESS, Optimizer};
 use super::state::State;
 use crate::field::GuidedSystem;
 use crate::mesh::TriMesh;
 use crate::param::{Effort, Fold};
 use crate::progress::Progress;
+use crate::surface::PrincipalCurvature;
 
 /// Rounds of stiffening; by what a folded triangle's weight grows in each, and up to what; over how many rings of
 /// triangles that fades out, and by what factor in each.
@@ -93,7 +94,7 @@ impl Optimizer<'_> {
     }
 
     /// The state, and what is known of its mesh: sharp edges, and curvature at the vertices.
-    pub(super) fn into_parts(self) -> Parts {
+    pub(super) fn into_parts(self) -> (State, Vec<bool>, Vec<PrincipalCurvature>) {
         (self.state, self.sharp, self.curvature)
     }
 

@@ -7,11 +7,12 @@
 use glam::{DVec2, DVec3};
 
 use super::EmbeddingError;
-use super::descent::{Known, Optimizer, Parts};
+use super::descent::{Known, Optimizer};
 use super::guides::is_creased;
 use super::job::{Job, Surface};
 use super::net::Net;
 use super::solver::{Aim, Features, Folded, Start};
+use super::state::State;
 use crate::dual::{Mark, RefinedMesh};
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
@@ -134,24 +135,10 @@ impl<'a> Optimizer<'a> {
     /// See [`EmbeddingError`].
     pub(super) fn from_map(
         job: &Job<'a>,
-        (state, sharp, curvature): Parts,
+        (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
         let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
-        Self::on(job, (state.net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
-    }
-
-    /// As [`Self::from_map`], with regular nodes free as they were there.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(super) fn from_rest(
-        job: &Job<'a>,
-        (state, sharp, curvature): Parts,
-        progress: &Progress,
-    ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let aim = Aim::Injective { shape: shape(job), start: Start::Loose(&state.solution.map.uv), steps: STEPS };
         Self::on(job, (state.net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
     }
 }

@@ -74,8 +74,6 @@ impl Features {
 pub(super) enum Start<'s> {
     /// From a map without folds: the coordinates of the corners of each triangle.
     Map(&'s [[DVec2; 3]]),
-    /// As [`Self::Map`], with regular nodes where they are and not held on their isolines.
-    Loose(&'s [[DVec2; 3]]),
     /// From a map that need not satisfy the relations, nor be in the chart of each triangle: as [`Self::Map`], up to
     /// translations and quarter turns.
     Turned(&'s [[DVec2; 3]]),
@@ -285,7 +283,7 @@ impl Setting<'_> {
     ) -> Result<Result<Solution, Folded>, EmbeddingError> {
         let Self { net, metric, field, objective, firmness, pulled } = *self;
         let wanted = match start {
-            Start::Map(uv) | Start::Loose(uv) | Start::Here(uv) => gradients(metric, &field.angle, uv),
+            Start::Map(uv) | Start::Here(uv) => gradients(metric, &field.angle, uv),
             Start::Turned(uv) => gradients(metric, &field.angle, uv).into_iter().map(along_field).collect(),
             Start::Moved { uv, gradients: before, turned } => {
                 let mut list = gradients(metric, &field.angle, uv);
@@ -298,7 +296,7 @@ impl Setting<'_> {
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
         let newton = system.newton()?;
         let few = match start {
-            Start::Map(_) | Start::Loose(_) | Start::Turned(_) => FEW_AT_FIRST,
+            Start::Map(_) | Start::Turned(_) => FEW_AT_FIRST,
             Start::Moved { .. } => FEW,
             Start::Here(_) => 0,
         };
@@ -318,7 +316,7 @@ impl Setting<'_> {
             tracing::debug!(folds = folded.len(), left = unfolded.folds.len(), "folds of the first guess");
             found = system.injective(&energy, unfolded.y.clone());
             // Of a step there are others; of a first map there is only one that is much worse.
-            if found.is_none() && matches!(start, Start::Map(_) | Start::Loose(_) | Start::Turned(_)) {
+            if found.is_none() && matches!(start, Start::Map(_) | Start::Turned(_)) {
                 let whole = (&net.mesh, &quarters[..]);
                 found = system.untangle(&newton, &energy, unfolded.y, whole, progress)?;
             }

@@ -211,23 +211,7 @@ fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A piece of the surface `point(u, v)` over `[0, 1]²`, of `n` by `m` quads, closed in `u`.
-    fn grid(n: u32, m: u32, closed_v: bool, point: impl Fn(f64, f64) -> DVec3) -> TriMesh {
-        let rows = if closed_v { m } else { m + 1 };
-        let points = (0..n * rows)
-            .map(|k| point(f64::from(k / rows) / f64::from(n), f64::from(k % rows) / f64::from(m)))
-            .collect();
-        let id = |i: u32, j: u32| (i % n) * rows + j % rows;
-        let faces: Vec<[u32; 3]> = (0..n * m)
-            .flat_map(|k| {
-                let (i, j) = (k / m, k % m);
-                let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
-                [[a, b, c], [a, c, d]]
-            })
-            .collect();
-        TriMesh::from_faces(points, &faces).unwrap()
-    }
+    use crate::testing::grid;
 
     fn circle(u: f64) -> DVec3 {
         let a = u * std::f64::consts::TAU;
@@ -240,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_cylinder_curves_across_its_axis() {
-        let mesh = grid(60, 40, false, |u, v| circle(u) * 0.5 + DVec3::Z * 4.0 * v);
+        let mesh = grid(60, 40, [true, false], |u, v| circle(u) * 0.5 + DVec3::Z * 4.0 * v);
         for radius in [0.0, 0.3] {
             for (v, c) in mesh.vertices().zip(curvature(&mesh, radius)) {
                 let z = mesh.position(v).z;
@@ -255,7 +239,7 @@ mod tests {
     #[test]
     fn a_sphere_is_convex_in_all_directions() {
         // A band of the sphere of radius 2, without its poles.
-        let mesh = grid(80, 40, false, |u, v| {
+        let mesh = grid(80, 40, [true, false], |u, v| {
             let b = (v - 0.5) * 2.6;
             (circle(u) * b.cos() + DVec3::Z * b.sin()) * 2.0
         });
@@ -270,7 +254,7 @@ mod tests {
     fn a_torus_has_its_textbook_curvatures() {
         let (big, small) = (1.0, 0.4);
         let tau = std::f64::consts::TAU;
-        let mesh = grid(120, 60, true, |u, v| {
+        let mesh = grid(120, 60, [true, true], |u, v| {
             circle(u) * (big + small * (v * tau).cos()) + DVec3::Z * small * (v * tau).sin()
         });
         for (v, c) in mesh.vertices().zip(curvature(&mesh, 0.12)) {
@@ -287,7 +271,7 @@ mod tests {
 
     #[test]
     fn directions_are_a_frame_and_flat_pieces_stay_finite() {
-        let flat = grid(6, 3, false, |u, v| circle(u) * (1.0 + v));
+        let flat = grid(6, 3, [true, false], |u, v| circle(u) * (1.0 + v));
         for c in curvature(&flat, 0.5) {
             assert_eq!((c.k_min, c.k_max), (0.0, 0.0));
             assert!(c.d_min.is_normalized() && c.d_max.is_normalized() && c.d_min.dot(c.d_max).abs() < 1e-12);

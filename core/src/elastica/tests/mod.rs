@@ -4,6 +4,7 @@ mod anchors;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use super::*;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::principal_curvature;
+use crate::testing::grid;
 
 /// Scales to bounding-box diagonal 1, as loading does.
 fn normalised(points: Vec<DVec3>, faces: &[[u32; 3]]) -> TriMesh {
@@ -24,43 +26,31 @@ fn normalised(points: Vec<DVec3>, faces: &[[u32; 3]]) -> TriMesh {
     TriMesh::from_faces(points.iter().map(|p| (*p - low) * scale).collect(), faces).unwrap()
 }
 
-/// A torus of `n` by `m` quads, each cut in two.
+/// A grid of `n` by `m` quads, each cut in two, closed along the first, and along the second if so; scaled like what is
+/// loaded. Vertices are numbered along the second.
+fn around(n: u32, m: u32, closed: bool, point: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let mesh = grid(m, n, [closed, true], |v, u| point(u, v));
+    let turned = |f| mesh.face_vertices(f).map(|v| v.0);
+    let faces: Vec<[u32; 3]> = mesh.faces().map(turned).map(|[a, b, c]| [a, c, b]).collect();
+    normalised(mesh.positions().to_vec(), &faces)
+}
+
+/// A torus of `n` by `m` quads.
 fn torus(n: u32, m: u32) -> TriMesh {
-    let point = |i: u32, j: u32| {
-        let (a, b) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(m));
-        let (a, b) = (a * std::f64::consts::TAU, b * std::f64::consts::TAU);
+    around(n, m, true, |u, v| {
+        let (a, b) = (TAU * u, TAU * v);
         let r = 1.0 + 0.4 * b.cos();
         DVec3::new(r * a.cos(), r * a.sin(), 0.4 * b.sin())
-    };
-    let id = |i: u32, j: u32| (i % n) * m + j % m;
-    let points = (0..n * m).map(|k| point(k / m, k % m)).collect();
-    let faces: Vec<[u32; 3]> = (0..n * m)
-        .flat_map(|k| {
-            let (i, j) = (k / m, k % m);
-            let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    normalised(points, &faces)
+    })
 }
 
 /// An open tube with a waist, of `n` by `m` quads.
 fn tube(n: u32, m: u32) -> TriMesh {
-    let point = |i: u32, j: u32| {
-        let (a, z) = (f64::from(i) / f64::from(n) * std::f64::consts::TAU, f64::from(j) / f64::from(m) - 0.5);
+    around(n, m, false, |u, v| {
+        let (a, z) = (TAU * u, v - 0.5);
         let r = 0.2 + z * z;
         DVec3::new(r * a.cos(), r * a.sin(), 2.0 * z)
-    };
-    let id = |i: u32, j: u32| (i % n) * (m + 1) + j;
-    let points = (0..n * (m + 1)).map(|k| point(k / (m + 1), k % (m + 1))).collect();
-    let faces: Vec<[u32; 3]> = (0..n * m)
-        .flat_map(|k| {
-            let (i, j) = (k / m, k % m);
-            let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    normalised(points, &faces)
+    })
 }
 
 /// An octahedron, subdivided `levels` times and drawn out to an ellipsoid.

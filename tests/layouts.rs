@@ -9,12 +9,13 @@ use plait_core::dual::{Mark, RefinedMesh};
 use plait_core::embed::{
     Embedded, EmbeddingError, Headings, Job, Net, Next, Optimizer, Settings, Snapshot, Surface, headings, optimise,
 };
-use plait_core::field::{Metric, indices};
+use plait_core::field::indices;
 use plait_core::layout::{Arc, Embedding, Line, Node, Patch, QuadLayout, carry, map_patches, redraw};
 use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::proxy::Proxy;
 use plait_core::quad::{Stops, refine, whole_counts};
+use plait_core::surface::Metric;
 use plait_core::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
 use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
 use support::{meshes, root};

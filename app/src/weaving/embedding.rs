@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::embed::{
-    Embedded, EmbeddingError, FeatureEdges, Next, PatchMeasures, Snapshot, TriangleMeasure, face_curvature,
-    measure_patches,
+    Embedded, EmbeddingError, FeatureEdges, Next, PatchMeasures, Snapshot, TriangleMeasure, measure_patches,
 };
 use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfaceIndex;
+use plait_core::surface::face_curvature;
 use plait_core::weave::{self, Drawn, Ground, PinnedParts, Session, WeaveError};
 
 use super::cover;

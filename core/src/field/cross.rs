@@ -12,13 +12,13 @@ use glam::DVec3;
 
 use super::curves::EdgePath;
 use super::jumps;
-use super::metric::Metric;
 use super::singular::{Singularity, inner_singularities};
 use super::smooth::{Pull, interpolate_vectors};
 use super::{FieldError, expect_length};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::c64;
+use crate::surface::Metric;
 
 /// A cross in each triangle and how the crosses of neighbours match.
 #[derive(Debug, Clone)]

@@ -9,9 +9,9 @@
 
 use std::f64::consts::PI;
 
-use super::metric::Metric;
 use super::{FieldError, expect_length};
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh, VertexId};
+use crate::surface::Metric;
 
 /// Half the window over which directions are averaged, in mean edge lengths.
 const WINDOW: f64 = 2.0;

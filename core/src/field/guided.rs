@@ -12,13 +12,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::metric::Metric;
 use super::singular::Singularity;
 use super::smooth::edge_weight;
 use super::{CrossField, FieldError, expect_length};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::{SparseHermitian, SpdFactor, SpdSymbolic, c64};
+use crate::surface::Metric;
 
 /// [`edge_weight`] of two equilateral triangles: divided by it an edge weighs 1 there, so that the strength of a
 /// guide means the same on every mesh.

@@ -8,8 +8,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::curves::{EdgePath, Step, left_fan};
-use super::metric::Metric;
 use crate::mesh::{HalfedgeId, TriMesh};
+use crate::surface::Metric;
 
 /// How often the fans are gone through: a change in one may upset another it shares an edge with.
 const ROUNDS: usize = 4;

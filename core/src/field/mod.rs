@@ -1,28 +1,31 @@
 //! Cross fields: the intrinsic metric they live in, their smooth interpolation and their singularities.
 //!
-//! The room for four-fold symmetric direction fields on meshes. It may use `mesh`, `solve` and `progress`.
+//! The room for four-fold symmetric direction fields on meshes. It may use `mesh`, `surface`, `solve` and `progress`.
 
+mod alignment;
 mod cross;
 mod curves;
 mod guided;
 mod jumps;
-mod metric;
 #[cfg(test)]
 pub(crate) mod samples;
 mod shape;
 mod singular;
+mod sizing;
 mod smooth;
 #[cfg(test)]
 mod tests;
 
 use thiserror::Error;
 
+pub(crate) use alignment::is_creased;
+pub use alignment::{feature_guides, shape_guides};
 pub use cross::{CrossField, interpolate};
 pub use curves::{EdgePath, Step, trace_curves};
 pub use guided::{Guide, GuidedField, GuidedSystem, RELIABLE, cross_field, indices, turning_number};
-pub use metric::Metric;
 pub use shape::{Guides, shape_field};
 pub use singular::{Singularity, pronounced};
+pub use sizing::{SizingSystem, rest_turns};
 
 use crate::mesh::{EdgeId, VertexId};
 use crate::progress::Cancelled;

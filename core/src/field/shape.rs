@@ -3,13 +3,13 @@
 //! Its singularities are where a layout of the shape wants irregular nodes.
 
 use super::cross::{CrossField, along_edges};
-use super::metric::Metric;
 use super::singular::all_singularities;
 use super::smooth::{Pull, interpolate_vectors};
 use super::{FieldError, expect_length, jumps};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::c64;
+use crate::surface::Metric;
 use glam::DVec3;
 
 /// Directions the field is drawn towards, for instance principal curvature directions.

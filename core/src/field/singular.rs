@@ -9,8 +9,8 @@ use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::FRAC_PI_2;
 
 use super::jumps::rest;
-use super::metric::Metric;
 use crate::mesh::{TriMesh, VertexId};
+use crate::surface::Metric;
 
 /// A vertex around which a cross field turns by other than a full turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

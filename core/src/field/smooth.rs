@@ -10,11 +10,11 @@
 //! steps follow that make all vectors unit and diffuse them (Viertel and Osting, An Approach to Quad Meshing
 //! Based on Harmonic Cross-Valued Maps), until close pairs have met.
 
-use super::metric::Metric;
 use super::{FieldError, expect_length};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::{SparseHermitian, SpdFactor, SpdSymbolic, c64};
+use crate::surface::Metric;
 
 /// Bounds of edge weights, which are about 2 in well-shaped triangles: slivers must neither cut the field off nor
 /// swamp the system.

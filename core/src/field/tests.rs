@@ -4,6 +4,7 @@ use super::samples::*;
 use super::*;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
+use crate::surface::Metric;
 
 fn sum(s: &[Singularity]) -> i64 {
     s.iter().map(|s| i64::from(s.index)).sum()

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::dual::{Dual, Line};
-use super::embed::{Embedding, embed};
+use super::initial_embedding::{Embedding, embed};
 use super::matching::{Matching, matching};
 use super::redraw::RedrawError;
 use super::structure::QuadLayout;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::RedrawError;
-use super::embed::{Embedding, lengths, round_map};
+use super::initial_embedding::{Embedding, lengths, round_map};
 use super::patch::{Lookup, border_sides, flood};
 use super::piece::Piece;
 use super::structure::QuadLayout;

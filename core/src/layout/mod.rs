@@ -8,8 +8,8 @@ mod carry;
 mod collapse;
 mod disc;
 mod dual;
-mod embed;
 mod file;
+mod initial_embedding;
 mod matching;
 mod patch;
 mod piece;
@@ -22,11 +22,11 @@ pub use carry::carry;
 pub use collapse::{CollapseError, Collapsed};
 pub(crate) use disc::flipped;
 pub use dual::Line;
-pub use embed::{EmbedError, Embedding, embed};
 pub use file::{
     ArcEnd, DrawError, Drawing, DrawnCorner, DrawnRegion, FileArc, FileNode, LayoutFile, LayoutFileError, Part,
     PathPoint,
 };
+pub use initial_embedding::{EmbedError, Embedding, embed};
 pub(crate) use patch::{Lookup, border_sides, flood};
 pub use patch::{PatchError, PatchMap, map_patches};
 pub(crate) use piece::Piece;

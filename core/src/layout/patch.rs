@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::disc;
-use super::embed::{Embedding, lengths};
+use super::initial_embedding::{Embedding, lengths};
 use super::piece::Piece;
 use super::structure::QuadLayout;
 use crate::dual::{Mark, RefinedMesh};

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::collapse::{CollapseError, Collapsed};
 use super::dual::Dual;
-use super::embed::{EmbedError, Embedding, embed};
+use super::initial_embedding::{EmbedError, Embedding, embed};
 use super::structure::{LayoutError, QuadLayout};
 use crate::dual::{ArrangementError, NoRoute};
 use crate::mesh::{TriMeshError, VertexId};

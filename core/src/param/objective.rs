@@ -8,8 +8,8 @@
 use glam::DVec2;
 
 use super::{ParamError, expect_length};
-use crate::field::Metric;
 use crate::mesh::FaceId;
+use crate::surface::Metric;
 
 /// The weights and targets of the error.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,8 +6,8 @@
 
 use glam::DVec2;
 
-use crate::field::Metric;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::surface::Metric;
 use crate::surface::SurfacePoint;
 
 /// A change of chart: some quarter turns, then a translation.

@@ -18,12 +18,13 @@ use super::objective::{Local, Objective, residuals};
 use super::seamless::{Relation, SeamlessMap};
 use super::unfold::{Effort, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
-use crate::field::{CrossField, Metric};
+use crate::field::CrossField;
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::solve::{
     Constraint, EliminationError, Reduction, SolveError, SparseHermitian, SpdFactor, SpdSymbolic, eliminate,
 };
+use crate::surface::Metric;
 
 /// The system of seamless maps of one topology.
 #[derive(Debug, Clone)]

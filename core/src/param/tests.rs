@@ -6,9 +6,10 @@ use glam::{DVec2, DVec3};
 
 use super::*;
 use crate::field::samples::*;
-use crate::field::{CrossField, Metric, cross_field, indices, shape_field};
+use crate::field::{CrossField, cross_field, indices, shape_field};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
+use crate::surface::Metric;
 use crate::surface::SurfacePoint;
 use crate::testing::square;
 

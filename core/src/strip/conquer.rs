@@ -13,8 +13,9 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Strip;
-use crate::field::{CrossField, EdgePath, Metric, Step, pronounced};
+use crate::field::{CrossField, EdgePath, Step, pronounced};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::surface::Metric;
 
 /// Folded triangles smaller than this part of the mean do not stop a strip: splitting edges leaves such slivers,
 /// and where isolines are forced through them their orientation means nothing.

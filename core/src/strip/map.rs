@@ -2,10 +2,11 @@
 //! keeps is equal at both ends (Campen, Quad Layouts, section 8.2.2).
 
 use super::StripError;
-use crate::field::{CrossField, EdgePath, Metric, Step};
+use crate::field::{CrossField, EdgePath, Step};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::param::{Objective, Relation, SeamlessMap, SeamlessSystem};
 use crate::progress::Progress;
+use crate::surface::Metric;
 use crate::surface::SurfacePoint;
 
 /// Errors of length and of direction count alike: strips are to be as wide as the surface has room.

@@ -12,10 +12,11 @@ use conquer::{Conquered, Ground};
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
-use crate::field::{self, CrossField, EdgePath, FieldError, Metric, trace_curves};
+use crate::field::{self, CrossField, EdgePath, FieldError, trace_curves};
 use crate::mesh::{FaceId, TriMesh};
 use crate::param::ParamError;
 use crate::progress::{Cancelled, Progress};
+use crate::surface::Metric;
 
 /// Why strips could not be computed.
 #[derive(Debug, Clone, PartialEq, Error)]

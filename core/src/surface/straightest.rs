@@ -9,8 +9,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 use super::SurfacePoint;
-use crate::field::Metric;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::surface::Metric;
 
 /// How close to a corner, as a fraction of the edge, a trace may pass: it is moved aside rather than end there.
 const CLEAR: f64 = 1e-6;

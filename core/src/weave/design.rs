@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::model::Options;
-use super::proposal::ElasticEnergy;
 use crate::mesh::{MeshSource, TriMesh, fingerprint};
 use crate::surface::SurfaceCurve;
+use crate::weave::model::Options;
+use crate::weave::proposal::ElasticEnergy;
 
 /// Number of a strip, never used again within one design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

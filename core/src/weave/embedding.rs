@@ -2,16 +2,17 @@
 
 use glam::DVec3;
 
-use super::design::Pin;
-use super::ground::{Ground, alike};
-use super::model::{Model, features};
-use super::session::{Session, WeaveError};
 use crate::dual::{Arrangement, Colour, RegionReport, assess, untangle, vertex_curvatures};
 use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
+use crate::weave::design::Pin;
+use crate::weave::error::WeaveError;
+use crate::weave::mesh_role::{Ground, alike};
+use crate::weave::model::{Model, features};
+use crate::weave::session::Session;
 
 /// A layout and a drawing of it.
 #[derive(Debug, Clone)]
@@ -73,7 +74,7 @@ pub fn draw(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError>
 }
 
 /// The drawing on the mesh that is woven on.
-pub(super) fn draw_as_woven(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
+pub(in crate::weave) fn draw_as_woven(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
     let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
     progress.report("Drawing nodes and arcs", 0.1);
@@ -145,7 +146,7 @@ fn corners_on_design(model: &Model) -> Vec<(VertexId, i8)> {
 
 /// Where the node of each region is to lie: at its only pronounced corner, or where there is none, at that corner of its
 /// features which is `curved` most in the sense of the node.
-pub(super) fn preferred_nodes(
+pub(in crate::weave) fn preferred_nodes(
     arrangement: &Arrangement,
     layout: &QuadLayout,
     reports: &[RegionReport],

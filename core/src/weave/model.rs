@@ -8,16 +8,17 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::session::WeaveError;
 use crate::dual::vertex_curvatures;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
-use crate::field::{Guides, Metric, pronounced, shape_field};
+use crate::field::{Guides, pronounced, shape_field};
 use crate::mesh::{
     LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
 };
 use crate::progress::{Cancelled, Progress};
 use crate::proxy::{Proxy, ProxyError};
+use crate::surface::Metric;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
+use crate::weave::error::WeaveError;
 
 /// What the designer may set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -91,12 +92,12 @@ pub struct Model {
     /// index in quarters.
     pub corners: Vec<(VertexId, i8)>,
     /// What the mesh as read has of its own where it has a proxy.
-    pub(super) own: Own,
+    pub(in crate::weave) own: Own,
 }
 
 /// What only the embedding needs where a mesh has a proxy; empty otherwise.
 #[derive(Debug, Default)]
-pub(super) struct Own {
+pub(in crate::weave) struct Own {
     /// Whether each edge of the mesh as read is sharp.
     pub sharp: Vec<bool>,
     /// Its curvature, once it was asked for.
@@ -179,7 +180,7 @@ fn proxy_of(
 }
 
 /// Whether each edge of `mesh` is a feature.
-pub(super) fn features(mesh: &TriMesh, options: &Options) -> Vec<bool> {
+pub(in crate::weave) fn features(mesh: &TriMesh, options: &Options) -> Vec<bool> {
     let mut sharp = sharp_edges(mesh, options.sharp_dihedral);
     drop_short_features(mesh, &mut sharp, SHORT_FEATURE);
     sharp

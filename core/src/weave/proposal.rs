@@ -3,12 +3,12 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::met::Company;
-use super::session::WeaveError;
 use crate::elastica::{ElasticaGraph, FoundLoop};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
+use crate::weave::error::WeaveError;
+use crate::weave::loop_contacts::Company;
 
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,14 +33,14 @@ pub struct ElasticEnergy {
 
 impl Proposal {
     /// A loop as it was found.
-    pub(super) fn found(l: &FoundLoop) -> Self {
+    pub(in crate::weave) fn found(l: &FoundLoop) -> Self {
         let energy = l.length + l.bending;
         let energy = ElasticEnergy { found: energy, now: energy };
         Self { curve: l.curve.clone(), cost: l.cost, energy: Some(energy) }
     }
 
     /// The same with its curve relaxed.
-    pub(super) fn relaxed(self, relaxed: Relaxed) -> Self {
+    pub(in crate::weave) fn relaxed(self, relaxed: Relaxed) -> Self {
         let energy = self.energy.map(|e| ElasticEnergy { now: relaxed.after.total, ..e });
         Self { curve: relaxed.curve, energy, ..self }
     }
@@ -56,7 +56,7 @@ const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
 /// A found loop, relaxed to a smooth curve that still passes `at` and crosses neither features nor placed strips more
 /// often than it did.
-pub(super) fn polished(
+pub(in crate::weave) fn polished(
     graph: &ElasticaGraph,
     company: &Company<'_>,
     found: &FoundLoop,

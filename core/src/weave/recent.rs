@@ -6,18 +6,18 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::woven::Woven;
 use crate::elastica::{Certainty, DirectionMask, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
+use crate::weave::woven::Woven;
 
 /// Number of vertices remembered: those under a small movement of the pointer.
 const REMEMBERED: usize = 16;
 
 /// What was found of late, and the memory of the searches.
 #[derive(Debug, Default)]
-pub(super) struct RecentSearches {
-    pub(super) workspace: SearchWorkspace,
+pub(in crate::weave) struct RecentSearches {
+    pub(in crate::weave) workspace: SearchWorkspace,
     /// For searches along strips; their own, because what they have to prepare differs.
     beside: SearchWorkspace,
     /// The strips among which all this was found.
@@ -37,7 +37,7 @@ struct Found {
 
 impl RecentSearches {
     /// The loops proposed at a vertex; what is there before all are found goes to `watch`.
-    pub(super) fn proposals(
+    pub(in crate::weave) fn proposals(
         &mut self,
         graph: &ElasticaGraph,
         woven: &Arc<Woven>,

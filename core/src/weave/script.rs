@@ -11,13 +11,15 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::design::{Design, DesignError};
-use super::model::Options;
-use super::proposal::Proposal;
-use super::session::{Session, WeaveError};
-use super::suggest::{Goal, Stuck};
 use crate::mesh::{LoadError, MeshSource};
 use crate::progress::Progress;
+use crate::weave::design::{Design, DesignError};
+use crate::weave::error::Stuck;
+use crate::weave::error::WeaveError;
+use crate::weave::model::Options;
+use crate::weave::proposal::Proposal;
+use crate::weave::search::suggest::Goal;
+use crate::weave::session::Session;
 
 /// One step of a designer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

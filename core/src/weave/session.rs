@@ -2,99 +2,24 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-use thiserror::Error;
-
-use super::design::{Design, DesignError, Pin, Strip, StripId};
-use super::ground::alike;
-use super::met::Company;
-use super::model::{Model, Options};
-use super::proposal::{Proposal, polished};
-use super::recent::RecentSearches;
-use super::suggest::Stuck;
-use super::woven::Woven;
 use crate::dual::{Arrangement, ArrangementError};
-use crate::elastica::{Certainty, ElasticaError, FoundLoop};
-use crate::embed::EmbeddingError;
-use crate::field::FieldError;
-use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
-use crate::mesh::{LoadError, LoadedMesh, MeshSource, fingerprint};
-use crate::progress::{Cancelled, Progress};
-use crate::proxy::CarryError;
+use crate::elastica::{Certainty, FoundLoop};
+use crate::mesh::{LoadedMesh, MeshSource, fingerprint};
+use crate::progress::Progress;
 use crate::surface::{SurfaceCurve, SurfacePoint};
-
-/// Whatever can go wrong while weaving.
-#[derive(Debug, Error)]
-pub enum WeaveError {
-    /// Stopped from outside.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// The search graph could not be built.
-    #[error(transparent)]
-    Elastica(#[from] ElasticaError),
-    /// A field could not be computed.
-    #[error(transparent)]
-    Field(#[from] FieldError),
-    /// Strips could not be arranged.
-    #[error(transparent)]
-    Arrangement(#[from] ArrangementError),
-    /// The mesh could not be read.
-    #[error(transparent)]
-    Mesh(#[from] LoadError),
-    /// The design could not be read, written or replayed.
-    #[error(transparent)]
-    Design(#[from] DesignError),
-    /// A strip woven on a proxy has no counterpart on the mesh itself.
-    #[error("the strip cannot be placed here: {0}")]
-    Carry(#[from] CarryError),
-    /// There is no valid layout yet.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The layout could not be embedded.
-    #[error(transparent)]
-    Embed(#[from] EmbedError),
-    /// The embedding could not be optimised.
-    #[error(transparent)]
-    Embedding(#[from] EmbeddingError),
-    /// The patches could not be mapped.
-    #[error(transparent)]
-    Patch(#[from] PatchError),
-    /// A layout file could not be read or written.
-    #[error(transparent)]
-    LayoutFile(#[from] LayoutFileError),
-    /// The layout of a file cannot be drawn on its mesh.
-    #[error(transparent)]
-    Draw(#[from] DrawError),
-    /// A layout that lacks arcs is completed by the optimisation only.
-    #[error("the layout lacks arcs; they only emerge when its embedding is optimised")]
-    Incomplete,
-    /// There is no such node or arc.
-    #[error("the layout has no {0}")]
-    NoPart(Part),
-    /// No strip can be suggested.
-    #[error(transparent)]
-    Stuck(#[from] Stuck),
-    /// The strips do not fit the mesh that other options would weave on.
-    #[error(
-        "the strips placed make another layout on the surface with this detail; remove those on small relief first"
-    )]
-    Options,
-    /// There is no such strip.
-    #[error("there is no strip {}", .0.0)]
-    NoStrip(StripId),
-    /// A file could not be written.
-    #[error("{path}: {source}")]
-    Write {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-}
+use crate::weave::design::{Design, Pin, Strip, StripId};
+use crate::weave::error::WeaveError;
+use crate::weave::loop_contacts::Company;
+use crate::weave::mesh_role::alike;
+use crate::weave::model::{Model, Options};
+use crate::weave::proposal::{Proposal, polished};
+use crate::weave::recent::RecentSearches;
+use crate::weave::woven::Woven;
+use rayon::prelude::*;
 
 /// A state of the history: strips, and the pins that were set while they were there.
 #[derive(Debug, Clone)]
-pub(super) struct Step {
+pub(in crate::weave) struct Step {
     strips: Vec<Strip>,
     pins: Vec<Pin>,
 }
@@ -331,18 +256,18 @@ impl Session {
     }
 
     /// Makes a state that has been left the last one of the history.
-    pub(super) fn remember(&mut self, before: Step) {
+    pub(in crate::weave) fn remember(&mut self, before: Step) {
         self.undo.push(before);
         self.redo.clear();
     }
 
     /// The present state.
-    pub(super) fn step(&self) -> Step {
+    pub(in crate::weave) fn step(&self) -> Step {
         Step { strips: self.design.strips.clone(), pins: self.design.pins.clone() }
     }
 
     /// Weaves other strips; what was before is for the caller to remember.
-    pub(super) fn weave(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
+    pub(in crate::weave) fn weave(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
         let newest = strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
         self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
         self.next_id = self.next_id.max(newest);
@@ -350,12 +275,12 @@ impl Session {
     }
 
     /// Goes back to a state that was woven before.
-    pub(super) fn restore(&mut self, step: Step, woven: Arc<Woven>) {
+    pub(in crate::weave) fn restore(&mut self, step: Step, woven: Arc<Woven>) {
         (self.design.strips, self.design.pins, self.woven) = (step.strips, step.pins, woven);
     }
 
     /// The number that the next strip gets.
-    pub(super) fn free_id(&self) -> StripId {
+    pub(in crate::weave) fn free_id(&self) -> StripId {
         StripId(self.next_id)
     }
 
@@ -368,7 +293,7 @@ impl Session {
     }
 
     /// What the surface would look like with `proposal` added; for suggestions.
-    pub(super) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
+    pub(in crate::weave) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
         let placed = self.design.strips.iter().map(Strip::woven);
         Arrangement::sketch(&self.model.mesh, placed.chain([curve]))
     }

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::design::Strip;
-use super::model::Model;
-use super::session::WeaveError;
 use crate::dual::{Arrangement, ArrangementError, Colour, Mark, RegionReport, assess};
 use crate::elastica::{DirectionMask, LoopClasses};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::strip::StripMap;
+use crate::weave::design::Strip;
+use crate::weave::error::WeaveError;
+use crate::weave::model::Model;
 
 /// Strips within this angle of a placed one's isolines are equivalent to it (Campen, section 8.2.2).
 const COMPATIBLE: f64 = std::f64::consts::FRAC_PI_4;

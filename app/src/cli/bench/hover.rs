@@ -4,8 +4,8 @@
 use std::time::{Duration, Instant};
 
 use plait_core::elastica::{ProposalQuery, SearchWorkspace};
-use plait_core::field::Metric;
 use plait_core::progress::Progress;
+use plait_core::surface::Metric;
 use plait_core::surface::SurfacePoint;
 use plait_core::weave::Session;
 

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use plait_core::field::Metric;
 use plait_core::mesh::{FaceId, TriMesh};
+use plait_core::surface::Metric;
 use plait_core::surface::{SurfacePoint, straightest};
 
 /// A sequence of random points.

@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::{ArcEnd, Drawing, FileArc, FileNode, LayoutFile, LayoutFileError, PathPoint};
 use crate::dual::RefinedMesh;
-use crate::layout::embed::Embedding;
+use crate::layout::initial_embedding::Embedding;
 use crate::layout::structure::{Node, QuadLayout};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, MeshSource, TriMesh, VertexId};
 use crate::surface::{Crossing, SurfacePoint};

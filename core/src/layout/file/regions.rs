@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use super::draw::Drawn;
 use super::{ArcEnd, DrawError, LayoutFile};
 use crate::dual::{Mark, RefinedMesh, next};
-use crate::layout::embed::{Embedding, lengths};
+use crate::layout::initial_embedding::{Embedding, lengths};
 use crate::layout::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::mesh::FaceId;
 

@@ -8,11 +8,11 @@
 use glam::DVec2;
 
 use super::{Injective, InjectiveEnergy, NewtonSystem, SAFE, first_flat};
-use crate::field::Metric;
 use crate::mesh::{FaceId, TriMesh};
 use crate::param::solve::SeamlessSystem;
 use crate::param::{ParamError, folds, gradients};
 use crate::progress::Progress;
+use crate::surface::Metric;
 
 /// Parts of the way at most: what can be reached is mostly reached in four or less.
 const PARTS: usize = 10;

@@ -4,9 +4,9 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::density::Density;
-use crate::field::Metric;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::param::objective::{Objective, hats};
+use crate::surface::Metric;
 
 /// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
 /// much as twice the area of the triangles beside it.

@@ -7,7 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::embedding::draw_as_woven;
-use super::export::export_drawn;
+use super::export::files::export_drawn;
+use super::search::detour;
 use super::*;
 use crate::dual::Colour;
 use crate::embed::Next;

@@ -1,0 +1,192 @@
+//! In which direction a node has to move for the map's distortion to become less (Campen, section 6.6.1).
+//!
+//! The energy depends on a node's position through the shape of the triangles around it, through the field and through
+//! the map. The last two are held still; what is left has a closed form over the ring of triangles. With the ring
+//! in the plane by the geodesic polar map, the triangle `(h, a, b)` of area `A`, `φ = J(b − a) / 2A` the gradient of the
+//! node's hat function and `W` the norm's matrix,
+//!
+//! `∂E/∂h = Σ A [(r_u·W r_u + r_v·W r_v) φ − 2 (φ·W r_u) ∇u − 2 (φ·W r_v) ∇v]`, `r_u = ∇u − u_t`, `r_v = ∇v − v_t`.
+
+use glam::DVec2;
+
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::param::{Density, Objective, Shape};
+use crate::surface::Metric;
+use crate::surface::PolarMap;
+
+/// What a triangle of a ring contributes: its two outer corners in the plane with the node at the origin, the three
+/// values of both coordinates (the node's first), the direction of `u_t`.
+#[derive(Debug, Clone, Copy)]
+struct Wedge {
+    face: FaceId,
+    outer: [DVec2; 2],
+    uv: [DVec2; 3],
+    axis: DVec2,
+    lengths: [f64; 2],
+}
+
+/// The descent direction `−∂E/∂h` at a vertex as a vector of its polar map.
+pub(in crate::embed) fn descent(
+    mesh: &TriMesh,
+    metric: &Metric,
+    angle: &[f64],
+    uv: &[[DVec2; 3]],
+    objective: &Objective,
+    v: VertexId,
+) -> DVec2 {
+    wedges(mesh, metric, angle, uv, objective, v).iter().map(|w| -w.gradient(DVec2::ZERO, objective.anisotropy)).sum()
+}
+
+/// The descent direction of the energy of maps without folds. With the map at its minimum for the node where it is,
+/// nothing but the field is held still that would move: then the direction is exact.
+pub(in crate::embed) fn injective_descent(
+    mesh: &TriMesh,
+    metric: &Metric,
+    angle: &[f64],
+    uv: &[[DVec2; 3]],
+    (objective, shape, firmness): (&Objective, Shape, &[f64]),
+    v: VertexId,
+) -> DVec2 {
+    let share = |w: &Wedge| firmness.get(w.face.index()).copied().unwrap_or(1.0);
+    let wedges = wedges(mesh, metric, angle, uv, objective, v);
+    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.at_firmness(share(w)))).sum()
+}
+
+fn wedges(
+    mesh: &TriMesh,
+    metric: &Metric,
+    angle: &[f64],
+    uv: &[[DVec2; 3]],
+    objective: &Objective,
+    v: VertexId,
+) -> Vec<Wedge> {
+    let polar = PolarMap::new(mesh, metric, v);
+    polar
+        .spokes
+        .iter()
+        .map(|&(h, at)| {
+            let (f, i): (FaceId, usize) = (mesh.face(h), h.index() % 3);
+            let far = at + polar.scale * metric.corner_angle(h);
+            let reach = [metric.length(h), metric.length(mesh.prev(h))];
+            let w = uv[f.index()];
+            Wedge {
+                face: f,
+                outer: [DVec2::from_angle(at) * reach[0], DVec2::from_angle(far) * reach[1]],
+                uv: [w[i], w[(i + 1) % 3], w[(i + 2) % 3]],
+                axis: DVec2::from_angle(at + angle[f.index()] - metric.direction(h)),
+                lengths: objective.lengths.get(f.index()).copied().unwrap_or([1.0; 2]),
+            }
+        })
+        .collect()
+}
+
+impl Wedge {
+    /// Area, gradient of the node's hat function, and per coordinate its gradient, the error and that times `W`.
+    fn terms(&self, h: DVec2, rho: f64) -> (f64, DVec2, [(DVec2, DVec2, DVec2); 2]) {
+        let [a, b] = self.outer;
+        let area = 0.5 * (a - h).perp_dot(b - h);
+        let hats = [b - a, h - b, a - h].map(|side| side.perp() / (2.0 * area));
+        let terms = [0, 1].map(|k| {
+            let gradient: DVec2 = (0..3).map(|i| hats[i] * self.uv[i][k]).sum();
+            let along = if k == 0 { self.axis } else { self.axis.perp() };
+            let error = gradient - along * self.lengths[k];
+            let weighed = along * along.dot(error) + along.perp() * (rho * along.perp().dot(error));
+            (gradient, error, weighed)
+        });
+        (area, hats[0], terms)
+    }
+
+    fn gradient(&self, h: DVec2, rho: f64) -> DVec2 {
+        let (area, phi, terms) = self.terms(h, rho);
+        terms
+            .iter()
+            .map(|&(gradient, error, weighed)| area * (error.dot(weighed) * phi - 2.0 * phi.dot(weighed) * gradient))
+            .sum()
+    }
+
+    /// Area, gradient of the node's hat function, and the gradients of the map in the frame of the field.
+    fn matrix(&self, h: DVec2) -> (f64, DVec2, [f64; 4]) {
+        let (area, phi, terms) = self.terms(h, 1.0);
+        let [[ux, uy], [vx, vy]] = terms.map(|(g, ..)| [g.dot(self.axis), g.dot(self.axis.perp())]);
+        (area, phi, [ux, uy, vx, vy])
+    }
+
+    /// As [`Self::gradient`], of an energy density `e(∇u, ∇v)`: `A [e φ − (∂e/∂∇u·φ) ∇u − (∂e/∂∇v·φ) ∇v]`.
+    fn injective_gradient(&self, h: DVec2, shape: Shape) -> DVec2 {
+        let (area, phi, j) = self.matrix(h);
+        let density = Density::new(shape, self.lengths);
+        let Some(e) = density.value(&j) else { return DVec2::ZERO };
+        let pull = density.gradient(&j);
+        let across = self.axis.perp();
+        let (px, py) = (phi.dot(self.axis), phi.dot(across));
+        let along = |k: usize| (pull[k] * px + pull[k + 1] * py) * (self.axis * j[k] + across * j[k + 1]);
+        area * (e * phi - along(0) - along(2))
+    }
+
+    #[cfg(test)]
+    fn injective_energy(&self, h: DVec2, shape: Shape) -> f64 {
+        let (area, _, j) = self.matrix(h);
+        area * Density::new(shape, self.lengths).value(&j).unwrap()
+    }
+
+    #[cfg(test)]
+    fn energy(&self, h: DVec2, rho: f64) -> f64 {
+        let (area, _, terms) = self.terms(h, rho);
+        area * terms.iter().map(|t| t.1.dot(t.2)).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_closed_form_agrees_with_finite_differences() {
+        let noise = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) % 1000) / 1000.0 - 0.5;
+        for k in 0..40 {
+            let n = 5 + k % 3;
+            let turn = std::f64::consts::TAU / f64::from(n);
+            let reach = |i: u32| 1.0 + 0.6 * noise(31 * k + i % n);
+            let wedges: Vec<Wedge> = (0..n)
+                .map(|i| Wedge {
+                    face: FaceId(i),
+                    outer: [0, 1].map(|j| DVec2::from_angle(turn * f64::from(i + j)) * reach(i + j)),
+                    uv: [1, 2, 3].map(|j| DVec2::new(noise(7 * k + i + j), noise(11 * k + 3 * i + j))),
+                    axis: DVec2::from_angle(3.0 * noise(k + i)),
+                    lengths: [1.0 + noise(i), 1.0 - noise(i)],
+                })
+                .collect();
+            let h = DVec2::new(0.2 * noise(k), 0.2 * noise(k + 5));
+            let energy = |h: DVec2| wedges.iter().map(|w| w.energy(h, 10.0)).sum::<f64>();
+            let exact: DVec2 = wedges.iter().map(|w| w.gradient(h, 10.0)).sum();
+            let step = 1e-5;
+            let difference = |d: DVec2| (energy(h + step * d) - energy(h - step * d)) / (2.0 * step);
+            let measured = DVec2::new(difference(DVec2::X), difference(DVec2::Y));
+            assert!(exact.distance(measured) < 1e-8 * (1.0 + exact.length()) * 10.0, "{exact} {measured}");
+        }
+    }
+
+    #[test]
+    fn so_does_that_of_maps_without_folds() {
+        let shape = Shape { anisotropy: 3.0, size: 0.3 };
+        let (n, turn) = (6, std::f64::consts::TAU / 6.0);
+        // A bent ring: the identity and a bit more.
+        let bent = |p: DVec2| p + DVec2::new(0.1 * p.y * p.y, 0.2 * p.x * p.y);
+        let corner = |i: u32| DVec2::from_angle(turn * f64::from(i)) * (1.0 + 0.1 * f64::from(i % n));
+        let wedges: Vec<Wedge> = (0..n)
+            .map(|i| Wedge {
+                face: FaceId(i),
+                outer: [corner(i), corner(i + 1)],
+                uv: [bent(DVec2::ZERO), bent(corner(i)), bent(corner(i + 1))],
+                axis: DVec2::from_angle(0.2 + 0.1 * f64::from(i)),
+                lengths: [1.0, 1.2],
+            })
+            .collect();
+        let h = DVec2::new(0.05, -0.08);
+        let energy = |h: DVec2| wedges.iter().map(|w| w.injective_energy(h, shape)).sum::<f64>();
+        let exact: DVec2 = wedges.iter().map(|w| w.injective_gradient(h, shape)).sum();
+        let difference = |d: DVec2| (energy(h + 1e-5 * d) - energy(h - 1e-5 * d)) / 2e-5;
+        let measured = DVec2::new(difference(DVec2::X), difference(DVec2::Y));
+        assert!(exact.distance(measured) < 1e-7 * (1.0 + exact.length()), "{exact} {measured}");
+    }
+}

@@ -1,0 +1,121 @@
+//! A layout from a file, made ready to be embedded.
+
+use std::path::Path;
+
+use crate::embed::{Headings, Surface};
+use crate::layout::LayoutFile;
+use crate::mesh::{LoadedMesh, MeshSource, Topology};
+use crate::progress::Progress;
+use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
+use crate::weave::embedding::{Drawn, PinnedParts};
+use crate::weave::error::WeaveError;
+use crate::weave::export::files::{Export, ExportOptions, Sketch, Watch, finish, make_folder};
+use crate::weave::export::report::{Subject, Times, write_report};
+use crate::weave::mesh_role::Ground;
+use crate::weave::model::{Options, features};
+
+/// A layout from a file with its mesh. The layout may lack arcs.
+#[derive(Debug)]
+pub struct OpenedLayout {
+    file: LayoutFile,
+    loaded: LoadedMesh,
+    topology: Topology,
+    index: SurfaceIndex,
+    curvature: Vec<PrincipalCurvature>,
+    sharp: Vec<bool>,
+    drawn: Drawn,
+    headings: Vec<Headings>,
+    pinned: PinnedParts,
+}
+
+impl OpenedLayout {
+    /// Reads a layout and its mesh, and draws the one on the other.
+    ///
+    /// # Errors
+    ///
+    /// What the file, the mesh or the layout have to say.
+    pub fn read(path: &Path, progress: &Progress) -> Result<Self, WeaveError> {
+        progress.report("Reading the layout", 0.0);
+        let mut file = LayoutFile::read(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let loaded = file.mesh.load(folder)?;
+        file.check_mesh(&loaded.mesh)?;
+        if let MeshSource::File(mesh) = &mut file.mesh {
+            let full = folder.join(&*mesh);
+            *mesh = full.canonicalize().unwrap_or(full);
+        }
+        let drawing = file.draw(&loaded.mesh)?;
+        progress.check()?;
+        let (layout, embedding) = drawing.to_embedding()?;
+        let mut pinned = PinnedParts {
+            nodes: file.nodes.iter().map(|n| n.fixed).collect(),
+            arcs: file.arcs.iter().map(|a| a.fixed).collect(),
+        };
+        // Boundary arcs that the file leaves out come after those it names.
+        pinned.arcs.resize(layout.arcs.len(), false);
+        let options = Options::default();
+        let sharp = features(&loaded.mesh, &options);
+        let index = SurfaceIndex::new(&loaded.mesh);
+        progress.report("Measuring curvature", 0.1);
+        let curvature = principal_curvature(&loaded.mesh, options.curvature_radius, &sharp);
+        progress.check()?;
+        let (topology, headings) = (Topology::new(&loaded.mesh), drawing.arc_headings());
+        let drawn = Drawn { layout, embedding, ground: Ground::Design };
+        Ok(Self { file, loaded, topology, index, curvature, sharp, drawn, headings, pinned })
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &LoadedMesh {
+        &self.loaded
+    }
+
+    /// Pins nodes and arcs besides those that the file says are fixed.
+    ///
+    /// # Errors
+    ///
+    /// [`WeaveError::NoPart`] if there is no such node or arc.
+    pub fn pin(&mut self, nodes: &[usize], arcs: &[usize]) -> Result<(), WeaveError> {
+        self.pinned.pin(nodes, arcs)?;
+        self.file.nodes.iter_mut().zip(&self.pinned.nodes).for_each(|(node, &pinned)| node.fixed = pinned);
+        self.file.arcs.iter_mut().zip(&self.pinned.arcs).for_each(|(arc, &pinned)| arc.fixed = pinned);
+        Ok(())
+    }
+
+    /// Embeds the layout and writes `layout.layout`, the layout as it was given but for chords collapsed, the meshes and `report.json`; the
+    /// inner result is the layout, or why there is none.
+    ///
+    /// # Errors
+    ///
+    /// The file that could not be written, or cancelled.
+    pub fn write_all(
+        &self,
+        options: &ExportOptions,
+        folder: &Path,
+        seconds: Times,
+        progress: &Progress,
+        watch: Watch<'_>,
+    ) -> Result<Result<Export, WeaveError>, WeaveError> {
+        make_folder(folder)?;
+        let mesh = &*self.loaded.mesh;
+        let sketch = Sketch {
+            surface: Surface { mesh, index: &self.index, curvature: &self.curvature, sharp: &self.sharp },
+            proxy: None,
+            units: self.loaded.units,
+            drawn: &self.drawn,
+            headings: &self.headings,
+            pinned: &self.pinned,
+        };
+        let result = finish(&sketch, None, options, progress, watch);
+        progress.check()?;
+        let mut file = self.file.clone();
+        if let Ok(export) = &result {
+            export.write(folder, &self.loaded.units)?;
+            if export.has_collapsed() {
+                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.before.drawing)?;
+            }
+        }
+        file.write(&folder.join("layout.layout"))?;
+        write_report(folder, Subject::File(&self.loaded, &self.topology), &result, seconds, mesh)?;
+        Ok(result)
+    }
+}

@@ -1,0 +1,236 @@
+//! Suggesting the strip that helps most now.
+//!
+//! In the most urgent region some well-spread points are taken, the loops through them are found, and each is
+//! tried in the arrangement. Taken is the one of least cost per step of progress. Progress is measured by the
+//! *deficit* of an arrangement, a weighted count of what keeps regions from being good nodes; it is zero
+//! exactly when nothing is left to do.
+
+use crate::dual::{Colour, Finding, RegionReport, assess};
+use crate::elastica::DirectionMask;
+use crate::mesh::VertexId;
+use crate::progress::{Cancelled, Progress};
+use crate::surface::{RelaxOptions, SurfaceCurve, relax};
+use crate::weave::error::Stuck;
+use crate::weave::error::WeaveError;
+use crate::weave::proposal::Proposal;
+use crate::weave::search::candidates::{Query, around, loops};
+use crate::weave::search::detour::detours;
+use crate::weave::session::Session;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// How far a layout is to be woven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Goal {
+    /// Until no region is red.
+    Valid,
+    /// Until no region is orange either.
+    Separated,
+}
+
+/// Points tried in the most urgent region: enough to meet each of its limbs.
+const POINTS: usize = 10;
+/// Candidates tried in the arrangement, the cheapest first.
+const TRIED: usize = 32;
+/// Classes of curves tried per region when no elastica loop helps.
+const DETOURS: usize = 200;
+/// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edges: it is jagged.
+const WIDE_TUBE: f64 = 6.0;
+
+/// How loops are searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Search {
+    /// The cheapest through each point and its alternatives.
+    Cheapest,
+    /// The cheapest through each point in each of several directions.
+    Around,
+}
+
+impl Session {
+    /// The strip that helps most now towards `goal`.
+    ///
+    /// # Errors
+    ///
+    /// [`Stuck`], or cancelled.
+    pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
+        let woven = self.woven();
+        let before = deficit(&woven.reports, goal);
+        let urgent = urgent_regions(&woven.reports, goal);
+        let Some(&first) = urgent.first() else { return Err(Stuck::Done.into()) };
+        let open = DirectionMask::none();
+        // First where and how strips should go; then in every direction, wherever it is urgent; then also
+        // along strips that are there; at last by connectivity alone.
+        let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
+        for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
+            progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
+            for &region in urgent.iter().take(regions) {
+                let candidates = self.candidates(region, search, mask, progress)?;
+                if let Some(best) = self.best_of(candidates, before, goal, progress)? {
+                    return Ok(self.smoothed(best, RelaxOptions::default().tube, before, goal, progress)?);
+                }
+            }
+        }
+        for &region in &urgent {
+            let root = woven.arrangement.regions[region as usize].faces[0];
+            let curves = detours(&woven.arrangement, &self.model().mesh, root, DETOURS);
+            if let Some(best) = self.best_of(curves, before, goal, progress)? {
+                return Ok(self.smoothed(best, WIDE_TUBE, before, goal, progress)?);
+            }
+        }
+        let reason = woven.reports[first as usize].findings.first().map(ToString::to_string).unwrap_or_default();
+        Err(Stuck::NoHelp { region: first, reason }.into())
+    }
+
+    /// Places suggestions until `goal` is reached; returns why not, if it is not.
+    ///
+    /// # Errors
+    ///
+    /// When cancelled.
+    pub fn weave_to(&mut self, goal: Goal, progress: &Progress) -> Result<Option<Stuck>, WeaveError> {
+        loop {
+            match self.suggest(goal, progress) {
+                Ok(proposal) => self.place(proposal, progress)?,
+                Err(WeaveError::Stuck(Stuck::Done)) => return Ok(None),
+                Err(WeaveError::Stuck(stuck)) => return Ok(Some(stuck)),
+                Err(error) => return Err(error),
+            };
+        }
+    }
+
+    /// A curve relaxed within a tube of so many mean edges, if it then still makes progress; else as it is.
+    fn smoothed(
+        &self,
+        proposal: Proposal,
+        tube: f64,
+        before: f64,
+        goal: Goal,
+        progress: &Progress,
+    ) -> Result<Proposal, Cancelled> {
+        let model = self.model();
+        let relaxed = relax(&model.mesh, &proposal.curve, &RelaxOptions { tube, ..Default::default() }, progress);
+        progress.check()?;
+        let Ok(relaxed) = relaxed else { return Ok(proposal) };
+        let helps = self.gain(&relaxed.curve, before, goal).is_some();
+        Ok(if helps { proposal.relaxed(relaxed) } else { proposal })
+    }
+
+    /// By how much a curve would reduce the deficit, if it would and can be placed.
+    fn gain(&self, curve: &SurfaceCurve, before: f64, goal: Goal) -> Option<f64> {
+        let model = self.model();
+        if model.proxy.is_some() && model.to_design(curve).is_err() {
+            return None;
+        }
+        let arrangement = self.arranged_with(curve).ok()?;
+        let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
+        let gain = before - deficit(&reports, goal);
+        (gain > 1e-9).then_some(gain)
+    }
+
+    /// Loops through well-spread points of a region, the cheapest first.
+    fn candidates(
+        &self,
+        region: u32,
+        search: Search,
+        mask: &DirectionMask,
+        progress: &Progress,
+    ) -> Result<Vec<Proposal>, WeaveError> {
+        let points = spread_points(self, region).into_iter();
+        let queries: Vec<Query> = points
+            .flat_map(|v| match search {
+                Search::Cheapest => vec![(v, None)],
+                Search::Around => around(self.model(), v).to_vec(),
+            })
+            .collect();
+        loops(&self.model().graph, &queries, mask, TRIED, progress)
+    }
+
+    /// The candidate of least cost per step of progress, if any makes progress.
+    fn best_of(
+        &self,
+        candidates: Vec<Proposal>,
+        before: f64,
+        goal: Goal,
+        progress: &Progress,
+    ) -> Result<Option<Proposal>, Cancelled> {
+        let prices: Vec<Option<f64>> = candidates
+            .par_iter()
+            .map(|c| {
+                progress.check()?;
+                Ok(self.gain(&c.curve, before, goal).map(|gain| c.cost / gain))
+            })
+            .collect::<Result<_, Cancelled>>()?;
+        tracing::debug!(candidates = candidates.len(), helpful = prices.iter().flatten().count(), "tried");
+        let best = prices
+            .iter()
+            .enumerate()
+            .filter_map(|(i, p)| p.map(|p| (i, p)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| candidates[i].clone());
+        Ok(best)
+    }
+}
+
+/// How much keeps the regions from being good nodes.
+fn deficit(reports: &[RegionReport], goal: Goal) -> f64 {
+    let one = |finding: &Finding| match *finding {
+        Finding::Untouched => 4.0,
+        Finding::Handles { handles } => 2.0 * handles as f64,
+        Finding::Borders { borders } => borders as f64 - 1.0,
+        Finding::Boundary { whole, stretches } => 2.0 * whole as f64 + stretches.saturating_sub(1 + whole) as f64,
+        Finding::NoCorner | Finding::Monogon => 1.0,
+        Finding::Digon => 0.5,
+        Finding::SeveralCorners { corners } => {
+            (if goal == Goal::Separated { 0.5 } else { 0.02 }) * (corners as f64 - 1.0)
+        }
+        Finding::Valence { .. } => 0.0,
+    };
+    reports.iter().flat_map(|r| &r.findings).map(one).sum()
+}
+
+/// Regions that keep the goal from being reached, the most urgent and then the largest first.
+fn urgent_regions(reports: &[RegionReport], goal: Goal) -> Vec<u32> {
+    let matters = |r: &RegionReport| {
+        r.colour == Colour::Red
+            || r.findings.contains(&Finding::Digon)
+            || (goal == Goal::Separated && r.colour == Colour::Orange)
+    };
+    let mut list: Vec<u32> = (0..reports.len() as u32).filter(|&i| matters(&reports[i as usize])).collect();
+    list.sort_by(|&a, &b| {
+        let (a, b) = (&reports[a as usize], &reports[b as usize]);
+        b.colour.cmp(&a.colour).then(b.area.total_cmp(&a.area))
+    });
+    list
+}
+
+/// Vertices of a region, each as far as possible from those before.
+fn spread_points(session: &Session, region: u32) -> Vec<VertexId> {
+    let (woven, mesh) = (session.woven(), &session.model().mesh);
+    let mut inside: Vec<u32> = woven.arrangement.regions[region as usize]
+        .faces
+        .iter()
+        .flat_map(|&f| woven.arrangement.refined.corners(f))
+        .filter(|&v| (v as usize) < mesh.n_vertices())
+        .collect();
+    inside.sort_unstable();
+    inside.dedup();
+    if inside.is_empty() {
+        return woven.arrangement.regions[region as usize]
+            .faces
+            .first()
+            .map(|&f| mesh.face_vertices(crate::mesh::FaceId(woven.arrangement.refined.base_face(f)))[0])
+            .into_iter()
+            .collect();
+    }
+    let mean = inside.iter().map(|&v| mesh.positions()[v as usize]).sum::<DVec3>() / inside.len() as f64;
+    let mut distance: Vec<f64> = inside.iter().map(|&v| mesh.positions()[v as usize].distance(mean)).collect();
+    let mut picked = Vec::new();
+    while picked.len() < POINTS.min(inside.len()) {
+        let far = (0..inside.len()).max_by(|&i, &j| distance[i].total_cmp(&distance[j])).unwrap_or(0);
+        let at = mesh.positions()[inside[far] as usize];
+        picked.push(VertexId(inside[far]));
+        for (d, &v) in distance.iter_mut().zip(&inside) {
+            *d = d.min(mesh.positions()[v as usize].distance(at));
+        }
+    }
+    picked
+}

@@ -7,31 +7,32 @@ use std::collections::HashMap;
 use glam::DVec3;
 use plait_core::dual::{Mark, RefinedMesh};
 use plait_core::embed::{
-    Embedded, EmbeddingError, Headings, Job, Net, Next, Optimizer, Settings, Snapshot, Surface, headings, optimise,
+    ArcHeadings, EmbeddingError, EmbeddingTopology, Next, OptimisedEmbedding, Optimiser, Problem, Settings, Snapshot,
+    Surface, arc_headings, optimise,
 };
 use plait_core::field::indices;
-use plait_core::layout::{Arc, Embedding, Line, Node, Patch, QuadLayout, carry, map_patches, redraw};
+use plait_core::layout::{Arc, DualCurve, Embedding, Node, Patch, QuadLayout, carry, map_patches, redraw};
 use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::proxy::Proxy;
-use plait_core::quad::{Stops, refine, whole_counts};
+use plait_core::quad::{Spacing, integer_grid_counts, refine};
 use plait_core::surface::Metric;
 use plait_core::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
-use plait_core::weave::{Drawn, Goal, Options, Script, Session, draw, replay};
+use plait_core::weave::{Goal, InitialLayout, Options, Script, Session, initial_layout, replay};
 use support::{meshes, root};
 
 /// A weave script replayed; `None` where its mesh is missing.
-fn woven(name: &str) -> Option<(Session, Drawn)> {
+fn woven(name: &str) -> Option<(Session, InitialLayout)> {
     meshes()?;
     let path = root().join("tests/scripts").join(name).with_extension("json");
     let script = Script::read(&path).unwrap();
     let session = replay(&script, path.parent().unwrap(), &Progress::new()).unwrap();
-    let drawn = draw(&session, &Progress::new()).unwrap();
+    let drawn = initial_layout(&session, &Progress::new()).unwrap();
     Some((session, drawn))
 }
 
 /// The end of an arc: the corner at its node, and the heading of the arc away from the node in that triangle.
-fn end(net: &Net, arc: u32, second: bool) -> (HalfedgeId, i32) {
+fn end(net: &EmbeddingTopology, arc: u32, second: bool) -> (HalfedgeId, i32) {
     let arc = &net.arcs[arc as usize];
     if !second {
         return (arc.start, i32::from(arc.heading));
@@ -43,9 +44,9 @@ fn end(net: &Net, arc: u32, second: bool) -> (HalfedgeId, i32) {
 #[test]
 fn the_field_turns_as_the_layout_says_on_every_surface() {
     for name in ["cino_3holes", "pretzel", "fertility_13k", "vase_open", "sleeve", "aqua_center"] {
-        let Some((session, Drawn { layout, embedding, .. })) = woven(name) else { return };
+        let Some((session, InitialLayout { layout, embedding, .. })) = woven(name) else { return };
         let surface = &session.model().mesh;
-        let net = Net::new(surface, &embedding, &layout, &headings(&layout)).unwrap();
+        let net = EmbeddingTopology::new(surface, &embedding, &layout, &arc_headings(&layout)).unwrap();
         // Around nodes as their valences say, around every other vertex not at all.
         let metric = Metric::new(&net.mesh);
         let found = indices(&net.mesh, &metric, &net.angle, &net.jump);
@@ -89,13 +90,18 @@ impl Stage {
         Self { index: SurfaceIndex::new(&mesh), curvature, sharp, mesh }
     }
 
-    fn job<'a>(&'a self, layout: &'a QuadLayout, drawing: &'a Embedding, headings: &'a [Headings]) -> Job<'a> {
+    fn job<'a>(
+        &'a self,
+        layout: &'a QuadLayout,
+        initial_embedding: &'a Embedding,
+        arc_headings: &'a [ArcHeadings],
+    ) -> Problem<'a> {
         let Self { mesh, index, curvature, sharp } = self;
-        Job {
+        Problem {
             surface: Surface { mesh, index, curvature, sharp },
             layout,
-            drawing,
-            headings,
+            initial_embedding,
+            arc_headings,
             pinned_nodes: &[],
             pinned_arcs: &[],
             settings: Settings::default(),
@@ -103,13 +109,13 @@ impl Stage {
     }
 }
 
-fn job_of<'a>(session: &'a Session, drawn: &'a Drawn, headings: &'a [Headings]) -> Job<'a> {
+fn job_of<'a>(session: &'a Session, drawn: &'a InitialLayout, arc_headings: &'a [ArcHeadings]) -> Problem<'a> {
     let model = session.model();
-    Job {
+    Problem {
         surface: Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp },
         layout: &drawn.layout,
-        drawing: &drawn.embedding,
-        headings,
+        initial_embedding: &drawn.embedding,
+        arc_headings,
         pinned_nodes: &[],
         pinned_arcs: &[],
         settings: Settings::default(),
@@ -117,7 +123,7 @@ fn job_of<'a>(session: &'a Session, drawn: &'a Drawn, headings: &'a [Headings]) 
 }
 
 /// The same drawing with arcs and nodes numbered backward, and patches that begin with their second side.
-fn renumbered(Drawn { layout, embedding, ground }: &Drawn) -> Drawn {
+fn renumbered(InitialLayout { layout, embedding, mesh_role }: &InitialLayout) -> InitialLayout {
     let (a, n) = (layout.arcs.len() as u32 - 1, layout.nodes.len() as u32 - 1);
     let patch = |p: &Patch| Patch {
         corners: [1, 2, 3, 0].map(|i| n - p.corners[i]),
@@ -128,25 +134,25 @@ fn renumbered(Drawn { layout, embedding, ground }: &Drawn) -> Drawn {
     let nodes = layout.nodes.iter().rev().cloned().collect();
     let arcs = layout.arcs.iter().rev().map(arc).collect();
     let turned = QuadLayout::new(nodes, arcs, layout.patches.iter().map(patch).collect(), euler).unwrap();
-    let mut drawing = embedding.clone();
-    for h in 0..3 * drawing.mesh.n_faces() as u32 {
+    let mut initial_embedding = embedding.clone();
+    for h in 0..3 * initial_embedding.mesh.n_faces() as u32 {
         if let Mark::Arc(k) = embedding.mesh.mark(h) {
-            drawing.mesh.set_mark(h, Mark::Arc(a - k));
+            initial_embedding.mesh.set_mark(h, Mark::Arc(a - k));
         }
     }
-    drawing.nodes.reverse();
-    drawing.arcs.reverse();
-    drawing.arc_parameters.reverse();
-    Drawn { layout: turned, embedding: drawing, ground: *ground }
+    initial_embedding.nodes.reverse();
+    initial_embedding.arcs.reverse();
+    initial_embedding.arc_parameters.reverse();
+    InitialLayout { layout: turned, embedding: initial_embedding, mesh_role: *mesh_role }
 }
 
 #[test]
 fn the_map_does_not_depend_on_how_parts_are_numbered() {
     let Some((session, drawn)) = woven("cino_3holes") else { return };
-    let energy = |drawn: &Drawn| {
-        let headings = headings(&drawn.layout);
-        let optimizer = Optimizer::new(&job_of(&session, drawn, &headings), &Progress::new()).unwrap();
-        optimizer.state().solution.energy
+    let energy = |drawn: &InitialLayout| {
+        let arc_headings = arc_headings(&drawn.layout);
+        let optimiser = Optimiser::new(&job_of(&session, drawn, &arc_headings), &Progress::new()).unwrap();
+        optimiser.state().solution.energy
     };
     let (a, b) = (energy(&drawn), energy(&renumbered(&drawn)));
     assert!(a > 0.0 && (a - b).abs() < 1e-6 * a, "{a} and {b}");
@@ -156,12 +162,12 @@ fn the_map_does_not_depend_on_how_parts_are_numbered() {
 fn energy_falls_and_half_of_it_in_three_steps() {
     for name in ["cino_3holes", "pretzel"] {
         let Some((session, drawn)) = woven(name) else { return };
-        let headings = headings(&drawn.layout);
-        let mut optimizer = Optimizer::new(&job_of(&session, &drawn, &headings), &Progress::new()).unwrap();
-        let mut seen = vec![optimizer.state().solution.energy];
-        while !optimizer.is_done() {
-            let better = optimizer.step(&Progress::new()).unwrap();
-            let (before, now) = (seen[seen.len() - 1], optimizer.state().solution.energy);
+        let arc_headings = arc_headings(&drawn.layout);
+        let mut optimiser = Optimiser::new(&job_of(&session, &drawn, &arc_headings), &Progress::new()).unwrap();
+        let mut seen = vec![optimiser.state().solution.energy];
+        while !optimiser.is_done() {
+            let better = optimiser.step(&Progress::new()).unwrap();
+            let (before, now) = (seen[seen.len() - 1], optimiser.state().solution.energy);
             assert!(if better { now < before } else { now == before }, "{name}: {before}, then {now}");
             seen.push(now);
         }
@@ -180,14 +186,14 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     let loaded = source.load(std::path::Path::new("")).unwrap();
     let mut session = Session::open(loaded, source, Options::default(), &Progress::new()).unwrap();
     session.weave_to(Goal::Valid, &Progress::new()).unwrap();
-    let drawn = draw(&session, &Progress::new()).unwrap();
-    let headings = headings(&drawn.layout);
-    let mut optimizer = Optimizer::new(&job_of(&session, &drawn, &headings), &Progress::new()).unwrap();
+    let drawn = initial_layout(&session, &Progress::new()).unwrap();
+    let arc_headings = arc_headings(&drawn.layout);
+    let mut optimiser = Optimiser::new(&job_of(&session, &drawn, &arc_headings), &Progress::new()).unwrap();
     for _ in 0..3 {
-        optimizer.step(&Progress::new()).unwrap();
+        optimiser.step(&Progress::new()).unwrap();
     }
-    optimizer.finish(&Progress::new()).unwrap();
-    let state = optimizer.state();
+    optimiser.finish(&Progress::new()).unwrap();
+    let state = optimiser.state();
     let (mesh, map) = (&state.net.mesh, &state.solution.map);
     let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
     let mut edges = 0;
@@ -289,7 +295,7 @@ fn icosahedron_of(splits: u32) -> (Stage, QuadLayout, Embedding) {
             refined.set_mark(h, Mark::Arc(a));
         }
     }
-    let drawing = Embedding {
+    let initial_embedding = Embedding {
         mesh: refined,
         base_face: (0..mesh.n_faces() as u32).collect(),
         nodes: (0..nodes.len() as u32).collect(),
@@ -298,26 +304,26 @@ fn icosahedron_of(splits: u32) -> (Stage, QuadLayout, Embedding) {
         // Every patch was two triangles.
         seeds: (0..patches.len() as u32).map(|p| (2 * p) << (2 * splits)).collect(),
     };
-    (Stage::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), drawing)
+    (Stage::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), initial_embedding)
 }
 
 /// That every arc of a drawing runs from its first node to its second along edges marked as its own.
-fn is_drawn(layout: &QuadLayout, drawing: &Embedding) {
-    for (a, (arc, path)) in (0..).zip(layout.arcs.iter().zip(&drawing.arcs)) {
+fn is_drawn(layout: &QuadLayout, initial_embedding: &Embedding) {
+    for (a, (arc, path)) in (0..).zip(layout.arcs.iter().zip(&initial_embedding.arcs)) {
         let ends = [path[0], path[path.len() - 1]];
-        assert_eq!(ends, arc.nodes.map(|n| drawing.nodes[n as usize]), "arc {a}");
+        assert_eq!(ends, arc.nodes.map(|n| initial_embedding.nodes[n as usize]), "arc {a}");
         for w in path.windows(2) {
-            let h = drawing.mesh.find(w[0], w[1]).unwrap();
-            assert_eq!(drawing.mesh.mark(h), Mark::Arc(a));
+            let h = initial_embedding.mesh.find(w[0], w[1]).unwrap();
+            assert_eq!(initial_embedding.mesh.mark(h), Mark::Arc(a));
         }
     }
-    assert_eq!(drawing.seeds.len(), layout.patches.len());
-    assert_eq!(map_patches(layout, drawing, &Progress::new()).unwrap().len(), layout.patches.len());
+    assert_eq!(initial_embedding.seeds.len(), layout.patches.len());
+    assert_eq!(map_patches(layout, initial_embedding, &Progress::new()).unwrap().len(), layout.patches.len());
 }
 
 #[test]
 fn a_drawing_is_carried_to_a_proxy_and_back() {
-    let (stage, layout, drawing) = icosahedron_of(4);
+    let (stage, layout, initial_embedding) = icosahedron_of(4);
     let proxy = Proxy::new(&stage.mesh, &stage.sharp, 6000, &Progress::new()).unwrap();
     let at = |v: VertexId| SurfacePoint {
         face: stage.mesh.face(stage.mesh.vertex_halfedge(v)),
@@ -327,30 +333,32 @@ fn a_drawing_is_carried_to_a_proxy_and_back() {
         }),
     };
     // Nodes of the drawing are vertices of the mesh.
-    let to = |n: usize| Some(proxy.to_proxy(&stage.mesh, at(VertexId(drawing.nodes[n]))).nearest_vertex(proxy.mesh()));
-    let carried = |line: &Line| proxy.line_to_proxy(&stage.mesh, &line.points, line.closed).ok();
-    let own = (&layout, &drawing, stage.mesh.n_vertices());
+    let to = |n: usize| {
+        Some(proxy.to_proxy(&stage.mesh, at(VertexId(initial_embedding.nodes[n]))).nearest_vertex(proxy.mesh()))
+    };
+    let carried = |line: &DualCurve| proxy.polyline_to_proxy(&stage.mesh, &line.points, line.closed).ok();
+    let own = (&layout, &initial_embedding, stage.mesh.n_vertices());
     let coarse = carry(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
     is_drawn(&layout, &coarse);
-    let carried = |line: &Line| proxy.line_to_original(&stage.mesh, &line.points, line.closed).ok();
+    let carried = |line: &DualCurve| proxy.polyline_to_original(&stage.mesh, &line.points, line.closed).ok();
     let own = (&layout, &coarse, proxy.mesh().n_vertices());
-    let back = carry(own, &stage.mesh, carried, |n| Some(VertexId(drawing.nodes[n])), &Progress::new());
+    let back = carry(own, &stage.mesh, carried, |n| Some(VertexId(initial_embedding.nodes[n])), &Progress::new());
     let back = back.unwrap().unwrap();
     is_drawn(&layout, &back);
     // Every part has kept its number: nodes lie where they lay, and arcs near.
-    assert_eq!(back.nodes, drawing.nodes);
+    assert_eq!(back.nodes, initial_embedding.nodes);
     let middle = |d: &Embedding, a: usize| d.mesh.positions[d.arcs[a][d.arcs[a].len() / 2] as usize];
     for a in 0..layout.arcs.len() {
-        let off = middle(&back, a).distance(middle(&drawing, a));
+        let off = middle(&back, a).distance(middle(&initial_embedding, a));
         assert!(off < 0.06, "arc {a} of a sphere of radius 0.3 is {off} off");
     }
 }
 
 #[test]
 fn a_large_mesh_is_embedded_by_way_of_a_proxy() {
-    let (stage, layout, drawing) = icosahedron_of(4);
-    let headings = headings(&layout);
-    let job = stage.job(&layout, &drawing, &headings);
+    let (stage, layout, initial_embedding) = icosahedron_of(4);
+    let arc_headings = arc_headings(&layout);
+    let job = stage.job(&layout, &initial_embedding, &arc_headings);
     let progress = Progress::new();
     let mut seen = 0;
     let mut on_surface = |s: &Snapshot| {
@@ -374,25 +382,30 @@ fn a_large_mesh_is_embedded_by_way_of_a_proxy() {
 
 #[test]
 fn a_proxy_does_not_outlast_a_cancellation() {
-    let (stage, layout, drawing) = icosahedron_of(4);
-    let headings = headings(&layout);
+    let (stage, layout, initial_embedding) = icosahedron_of(4);
+    let arc_headings = arc_headings(&layout);
     let progress = Progress::new();
     let mut stop = |_: &Snapshot| {
         progress.cancel();
         Next::Continue
     };
-    let stopped = optimise(&stage.job(&layout, &drawing, &headings), &progress, &mut stop);
+    let stopped = optimise(&stage.job(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
     assert!(matches!(stopped, Err(EmbeddingError::Cancelled(_))));
 }
 
-fn embedded(settings: Settings) -> (QuadLayout, Embedded) {
-    let (stage, layout, drawing) = icosahedron();
-    embedded_on(&stage, layout, &drawing, settings)
+fn embedded(settings: Settings) -> (QuadLayout, OptimisedEmbedding) {
+    let (stage, layout, initial_embedding) = icosahedron();
+    embedded_on(&stage, layout, &initial_embedding, settings)
 }
 
-fn embedded_on(stage: &Stage, layout: QuadLayout, drawing: &Embedding, settings: Settings) -> (QuadLayout, Embedded) {
-    let headings = headings(&layout);
-    let job = Job { settings, ..stage.job(&layout, drawing, &headings) };
+fn embedded_on(
+    stage: &Stage,
+    layout: QuadLayout,
+    initial_embedding: &Embedding,
+    settings: Settings,
+) -> (QuadLayout, OptimisedEmbedding) {
+    let arc_headings = arc_headings(&layout);
+    let job = Problem { settings, ..stage.job(&layout, initial_embedding, &arc_headings) };
     let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
     done.layout.check(2).unwrap();
     let sum: i64 = done.layout.nodes.iter().map(|n| 4 - n.valence as i64).sum();
@@ -403,13 +416,13 @@ fn embedded_on(stage: &Stage, layout: QuadLayout, drawing: &Embedding, settings:
 #[test]
 fn short_chords_are_collapsed() {
     let (_, plain) = embedded(Settings::default());
-    assert!(plain.report.collapsed.is_empty() && plain.drawing.is_none());
+    assert!(plain.report.collapsed.is_empty() && plain.initial_embedding.is_none());
     let shortest = plain.maps.iter().flat_map(|m| [m.size.x, m.size.y]).fold(f64::INFINITY, f64::min);
     let (given, done) = embedded(Settings { collapse: Some(1.2 * shortest), ..Settings::default() });
     let report = &done.report;
     assert!(!report.collapsed.is_empty(), "{report:?}");
     assert_eq!(done.layout.chords, given.chords - report.collapsed.len());
-    assert!(done.layout.patches.len() < given.patches.len() && done.drawing.is_some());
+    assert!(done.layout.patches.len() < given.patches.len() && done.initial_embedding.is_some());
     assert!(done.maps.iter().all(|m| m.flipped == 0 && m.size.min_element() > 0.0));
 }
 
@@ -417,7 +430,7 @@ fn short_chords_are_collapsed() {
 fn strips_are_left_out_that_only_make_a_layout_irregular() {
     // The chords of the icosahedron go around its corners, and those of three corners of a triangle cross in it. Without
     // two of these the corners are one node, and without the third the middle of the triangle becomes a part of it.
-    let (stage, layout, drawing) = icosahedron();
+    let (stage, layout, initial_embedding) = icosahedron();
     let simpler = |layout: &QuadLayout| {
         let less = |c| layout.collapse(c).is_ok_and(|left| left.layout.irregularity() < layout.irregularity());
         (0..layout.chords as u32).any(less)
@@ -426,7 +439,8 @@ fn strips_are_left_out_that_only_make_a_layout_irregular() {
     let pairs = (0..layout.chords).flat_map(|a| (0..a).map(move |b| (a, b)));
     let mut gone = pairs.map(|(a, b)| (0..layout.chords).map(|c| c == a || c == b).collect::<Vec<bool>>());
     let gone = gone.find(|gone| layout.without(gone).is_ok_and(|left| simpler(&left.layout))).unwrap();
-    let left = redraw(&layout, &drawing, &gone, |_| false, stage.mesh.n_vertices(), &Progress::new()).unwrap();
+    let left =
+        redraw(&layout, &initial_embedding, &gone, |_| false, stage.mesh.n_vertices(), &Progress::new()).unwrap();
     let settings = Settings { simplify: true, ..Settings::default() };
     let (given, done) = embedded_on(&stage, left.layout, &left.embedding, settings);
     assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);
@@ -437,9 +451,9 @@ fn strips_are_left_out_that_only_make_a_layout_irregular() {
 fn patches_are_whole_numbers_of_quads() {
     let edge = 0.06;
     let (_, done) = embedded(Settings { integer: Some(edge), ..Settings::default() });
-    let (counts, off) = whole_counts(&done.layout, &done.maps, edge);
+    let (counts, off) = integer_grid_counts(&done.layout, &done.maps, edge);
     assert!(off < 1e-9, "{off}");
-    let quads = refine(&done.layout, &done.embedding, &done.maps, &Stops::even(&done.layout, &counts));
+    let quads = refine(&done.layout, &done.embedding, &done.maps, &Spacing::even(&done.layout, &counts));
     let whole: f64 = done.maps.iter().map(|m| m.size.x * m.size.y).sum();
     assert!((quads.quads.len() as f64 * edge * edge - whole).abs() < 1e-9, "all quads are unit squares");
     let triangles: Vec<[u32; 3]> = quads.quads.iter().flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]).collect();
@@ -447,11 +461,11 @@ fn patches_are_whole_numbers_of_quads() {
 
     for name in ["cino_3holes", "pretzel"] {
         let Some((session, drawn)) = woven(name) else { return };
-        let headings = headings(&drawn.layout);
+        let arc_headings = arc_headings(&drawn.layout);
         let settings = Settings { integer: Some(0.05), steps: 3, ..Settings::default() };
-        let job = Job { settings, ..job_of(&session, &drawn, &headings) };
+        let job = Problem { settings, ..job_of(&session, &drawn, &arc_headings) };
         let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
-        let (_, off) = whole_counts(&done.layout, &done.maps, 0.05);
+        let (_, off) = integer_grid_counts(&done.layout, &done.maps, 0.05);
         assert!(off < 1e-8, "{name}: {off}");
     }
 }

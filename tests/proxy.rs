@@ -2,7 +2,7 @@
 
 mod support;
 
-use plait_core::mesh::{LoadedMesh, builtin, load, sharp_edges, subdivided, write_mesh_obj};
+use plait_core::mesh::{LoadedMesh, builtin, load, loop_subdivision, sharp_edges, write_mesh_obj};
 use plait_core::progress::Progress;
 use plait_core::surface::SurfaceIndex;
 use plait_core::weave::{Design, Session};
@@ -13,7 +13,7 @@ use support::{Shape, errors, manifold, plait, read_faces, text};
 fn finer(name: &str) -> LoadedMesh {
     let mut loaded = builtin(name).unwrap();
     let crease = sharp_edges(&loaded.mesh, 0.7);
-    loaded.mesh = subdivided(&loaded.mesh, &crease).unwrap().0.into();
+    loaded.mesh = loop_subdivision(&loaded.mesh, &crease).unwrap().0.into();
     loaded
 }
 

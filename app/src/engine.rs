@@ -200,7 +200,7 @@ pub struct Scene {
     /// Placed strips in order.
     pub strips: Vec<Strip>,
     /// What remains to be done, most urgent first; empty when nothing does.
-    pub remains: Vec<Remark>,
+    pub remarks: Vec<Remark>,
     /// Where the design stands, in one sentence: "Ready to export: 14 patches, 16 nodes (8 irregular)".
     pub summary: String,
     /// Whether the layout is valid and can leave.
@@ -250,7 +250,7 @@ pub struct DisplaySurface {
     /// The triangle of the design mesh that each face lies in.
     pub base: Arc<Vec<u32>>,
     /// The colour of the region of each face; empty when there are no regions yet.
-    pub regions: Vec<RegionColor>,
+    pub regions: Vec<RegionColour>,
     /// The stripe pattern of each face along both families; empty when there is no strip map.
     pub stripes: Vec<[Option<Stripes>; 2]>,
 }
@@ -266,7 +266,7 @@ pub struct Stripes {
 
 /// How urgent a region is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum RegionColor {
+pub enum RegionColour {
     /// Nothing to remark.
     #[default]
     None,
@@ -297,7 +297,7 @@ pub struct Strip {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
     /// How urgent.
-    pub color: RegionColor,
+    pub color: RegionColour,
     /// In words: "3 regions are not discs".
     pub text: String,
     /// Where the first of them is.

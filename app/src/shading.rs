@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColor, Scene, StripId};
+use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId};
 use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
 
 /// Placed strips.
@@ -27,23 +27,23 @@ pub const IRREGULAR: [[u8; 4]; 2] = [[0xd2, 0x3c, 0x3c, 0xff], [0x25, 0x63, 0xc9
 const SEAM: [u8; 4] = [0xff, 0xff, 0xff, 0xb4];
 
 /// The colour of a region as the panels show it.
-pub fn region_rgb(color: RegionColor) -> [u8; 3] {
+pub fn region_rgb(color: RegionColour) -> [u8; 3] {
     match color {
-        RegionColor::None => [0x3d, 0x9b, 0x5f],
-        RegionColor::Yellow => [0xe3, 0xc0, 0x1c],
-        RegionColor::Orange => [0xee, 0x8a, 0x1d],
-        RegionColor::Red => [0xd9, 0x3b, 0x36],
+        RegionColour::None => [0x3d, 0x9b, 0x5f],
+        RegionColour::Yellow => [0xe3, 0xc0, 0x1c],
+        RegionColour::Orange => [0xee, 0x8a, 0x1d],
+        RegionColour::Red => [0xd9, 0x3b, 0x36],
     }
 }
 
 /// The wash over the surface: urgent colours wash more strongly.
-fn tint(color: RegionColor) -> [u8; 4] {
+fn tint(color: RegionColour) -> [u8; 4] {
     let [r, g, b] = region_rgb(color);
     match color {
-        RegionColor::None => [0; 4],
-        RegionColor::Yellow => [r, g, b, 0x70],
-        RegionColor::Orange => [r, g, b, 0x80],
-        RegionColor::Red => [r, g, b, 0x80],
+        RegionColour::None => [0; 4],
+        RegionColour::Yellow => [r, g, b, 0x70],
+        RegionColour::Orange => [r, g, b, 0x80],
+        RegionColour::Red => [r, g, b, 0x80],
     }
 }
 

@@ -108,7 +108,7 @@ impl Progress {
     }
 
     /// Takes the fractions reported from now on for those of a part of the whole, or of all of it again.
-    pub fn take_part(&self, part: Option<[f64; 2]>) {
+    pub fn set_range(&self, part: Option<[f64; 2]>) {
         *self.part.lock().unwrap_or_else(PoisonError::into_inner) = part;
     }
 
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_part_of_the_work_reports_as_a_part_of_the_whole() {
         let progress = Progress::new();
-        progress.take_part(Some([0.2, 0.6]));
+        progress.set_range(Some([0.2, 0.6]));
         progress.report("part", 0.5);
         assert_eq!(progress.state(), ("part".to_owned(), 0.4));
         // The end of a part is not the end: time goes on.
@@ -164,7 +164,7 @@ mod tests {
         let before = progress.stage_times()[0].seconds;
         std::thread::sleep(std::time::Duration::from_millis(2));
         assert!(progress.stage_times()[0].seconds > before);
-        progress.take_part(None);
+        progress.set_range(None);
         progress.report("rest", 0.9);
         assert_eq!(progress.state(), ("rest".to_owned(), 0.9));
     }

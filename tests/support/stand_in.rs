@@ -174,7 +174,7 @@ impl Engine for Session {
             index: Arc::clone(&self.index),
             surface: Arc::clone(&self.surface),
             strips: (0..self.strips).map(strip).collect(),
-            remains: Vec::new(),
+            remarks: Vec::new(),
             summary: String::new(),
             exportable: valid,
             layout: valid.then(|| Arc::new(self.layout.clone())),

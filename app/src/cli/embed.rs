@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
-use plait_core::weave::{Export, OpenedLayout, Session, Times, draw, write_all};
+use plait_core::weave::{Export, OpenedLayout, Session, Times, initial_layout, write_all};
 
 use super::weave::{explain, export_options, open, say};
 use super::{DetailArguments, EmbedArguments, has_extension};
@@ -66,7 +66,7 @@ fn pin(session: &mut Session, arguments: &EmbedArguments, progress: &Progress) -
     if arguments.pin_nodes.is_empty() && arguments.pin_arcs.is_empty() {
         return Ok(());
     }
-    let drawn = draw(session, progress).map_err(|error| explain(session, error))?;
+    let drawn = initial_layout(session, progress).map_err(|error| explain(session, error))?;
     let mut parts = drawn.pinned(&session.design().pins);
     parts.pin(&arguments.pin_nodes, &arguments.pin_arcs)?;
     session.set_pins(drawn.pins(&parts));

@@ -10,8 +10,8 @@ use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
 use plait_core::weave::{
-    Design, ExportOptions, Goal, Ground, Improvement, MeshSource, Options, QuadSize, ROUNDS, Script, Session, Shortest,
-    WeaveError, replay, write_all,
+    CollapseLength, Design, ExportOptions, Goal, IMPROVEMENT_ROUNDS, Improvement, MeshRole, MeshSource, Options,
+    QuadSize, Script, Session, WeaveError, replay, write_all,
 };
 
 use super::embed::summary;
@@ -39,7 +39,7 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
     }
     let woven = start.elapsed().as_secs_f64();
     if let Some(rounds) = arguments.improve {
-        improve(&mut session, rounds.unwrap_or(ROUNDS), &progress)?;
+        improve(&mut session, rounds.unwrap_or(IMPROVEMENT_ROUNDS), &progress)?;
     }
     let improved = start.elapsed().as_secs_f64();
     let mut seconds = BTreeMap::from([("open".to_owned(), opened), ("weave".to_owned(), woven - opened)]);
@@ -58,7 +58,7 @@ pub fn run(arguments: &WeaveArguments) -> anyhow::Result<()> {
         summary(&export),
         start.elapsed().as_secs_f64(),
     ));
-    if export.ground == Ground::Proxy {
+    if export.mesh_role == MeshRole::Proxy {
         say("plait: the layout is embedded on the proxy, and its quads are carried to the mesh");
     }
     if let Some(Err(problem)) = export.optimised {
@@ -83,8 +83,8 @@ pub(super) fn export_options(
 ) -> anyhow::Result<ExportOptions> {
     let collapse = match refine.collapse {
         None => None,
-        Some(None) => Some(Shortest::Quad),
-        Some(Some(length)) if length.is_finite() && length > 0.0 => Some(Shortest::Length(length)),
+        Some(None) => Some(CollapseLength::Quad),
+        Some(Some(length)) if length.is_finite() && length > 0.0 => Some(CollapseLength::Length(length)),
         Some(Some(length)) => anyhow::bail!("the length to collapse must be positive, not {length}"),
     };
     Ok(ExportOptions {

@@ -15,7 +15,7 @@ use plait_core::weave::{Model, Session};
 use rayon::prelude::*;
 
 use super::{stripes, words};
-use crate::engine::{DisplaySurface, RegionColor, Stripes};
+use crate::engine::{DisplaySurface, RegionColour, Stripes};
 
 /// What of the display stays the same while strips come and go.
 pub struct Cover {
@@ -54,7 +54,7 @@ impl Cover {
         let refined = &woven.arrangement.refined;
         let pieces = Pieces::new(refined, model.mesh.n_faces());
         let piece: Vec<u32> = self.middles.par_iter().map(|p| pieces.at(refined, &model.mesh, p)).collect();
-        let colors: Vec<RegionColor> = woven.reports.iter().map(|r| words::color(r.colour)).collect();
+        let colors: Vec<RegionColour> = woven.reports.iter().map(|r| words::color(r.colour)).collect();
         let color = |&f: &u32| colors[woven.arrangement.region_of_face[f as usize] as usize];
         surface.regions = piece.par_iter().map(color).collect();
         if let Some(map) = &woven.strip_map {

@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::embed::{
-    Embedded, EmbeddingError, FeatureEdges, Next, PatchMeasures, Snapshot, TriangleMeasure, measure_patches,
+    EmbeddingError, FeatureEdges, Next, OptimisedEmbedding, PatchMeasures, Snapshot, TriangleMeasure, measure_patches,
 };
 use plait_core::layout::{Embedding, Node, PatchMap, QuadLayout};
 use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfaceIndex;
 use plait_core::surface::face_curvature;
-use plait_core::weave::{self, Drawn, Ground, PinnedParts, Session, WeaveError};
+use plait_core::weave::{self, InitialLayout, MeshRole, PinnedParts, Session, WeaveError};
 
 use super::cover;
 use crate::engine::{
-    EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColor, Remark,
+    EmbeddingStep, EmbeddingSummary, EngineError, LayoutArc, LayoutNode, LayoutPreview, RegionColour, Remark,
     TriangleDistortion,
 };
 
@@ -33,13 +33,13 @@ const ROUNDS_OFF_SURFACE: usize = 15;
 
 /// The first drawing of a layout, and how it is shown.
 pub struct Shown {
-    pub drawn: Drawn,
+    pub drawn: InitialLayout,
     pub preview: LayoutPreview,
 }
 
 /// An optimised embedding, and how it is shown.
 pub struct Optimised {
-    pub embedded: Embedded,
+    pub embedded: OptimisedEmbedding,
     pub preview: LayoutPreview,
     pub summary: Arc<EmbeddingSummary>,
 }
@@ -47,7 +47,7 @@ pub struct Optimised {
 impl Shown {
     /// Draws the layout of a session.
     pub fn new(session: &Session, progress: &Progress) -> Result<Self, WeaveError> {
-        let drawn = weave::draw(session, progress)?;
+        let drawn = weave::initial_layout(session, progress)?;
         let (nodes, arcs) = drawing(&drawn.embedding);
         let model = session.model();
         let on_surface = |p| model.index.nearest(p).position(&model.loaded.mesh);
@@ -128,7 +128,7 @@ pub fn optimise(
     let pinned = shown.drawn.pinned(&session.design().pins);
     let start = last.map_or(&shown.preview, |l| &l.preview);
     let layout = with_pins(start, &pinned);
-    let mut from = |drawn: &Drawn| {
+    let mut from = |drawn: &InitialLayout| {
         let model = session.model();
         let ends = drawn.layout.arcs.iter().map(|a| a.nodes).collect();
         let layout = layout.clone();
@@ -139,10 +139,10 @@ pub fn optimise(
         };
         weave::optimise(session, drawn, &pinned, progress, &mut relay).map_err(|error| failed(&error, progress))
     };
-    let again = last.map(|l| Drawn {
+    let again = last.map(|l| InitialLayout {
         layout: shown.drawn.layout.clone(),
         embedding: l.embedded.embedding.clone(),
-        ground: shown.drawn.ground,
+        mesh_role: shown.drawn.mesh_role,
     });
     let embedded = match again.as_ref().map(&mut from) {
         // Pinned parts are to stay where they are now, not where the first drawing had them.
@@ -211,14 +211,14 @@ fn drag(points: &mut [DVec3], ends: [DVec3; 2], on_surface: impl Fn(DVec3) -> DV
     }
 }
 
-fn finished(session: &Session, drawn: &Drawn, embedded: Embedded) -> Optimised {
+fn finished(session: &Session, drawn: &InitialLayout, embedded: OptimisedEmbedding) -> Optimised {
     let model = session.model();
-    let surface = model.surface(drawn.ground);
+    let surface = model.surface(drawn.mesh_role);
     let bending = face_curvature(surface.mesh, surface.curvature, |_| true);
     let (_, patches, triangles) = measure_patches(&embedded.maps, &bending);
     let report = &embedded.report;
     let mut distortion = on_surface(surface.mesh.n_faces(), &embedded.maps, &triangles);
-    if drawn.ground == Ground::Proxy {
+    if drawn.mesh_role == MeshRole::Proxy {
         distortion = cover::faces(model).iter().map(|p| distortion[p.face.index()]).collect();
     }
     let summary = EmbeddingSummary {
@@ -270,7 +270,7 @@ fn folds<'a>(all: impl Iterator<Item = (&'a str, DVec3)>) -> Vec<Remark> {
     }
     let remark = |(reason, n, place): (&str, usize, DVec3)| {
         let triangles = if n == 1 { "triangle is" } else { "triangles are" };
-        Remark { color: RegionColor::Red, text: format!("{n} {triangles} folded: {reason}"), place: Some(place) }
+        Remark { color: RegionColour::Red, text: format!("{n} {triangles} folded: {reason}"), place: Some(place) }
     };
     groups.into_iter().map(remark).collect()
 }

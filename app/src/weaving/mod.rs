@@ -19,7 +19,7 @@ use plait_core::mesh::builtin_names;
 use plait_core::progress::Progress;
 use plait_core::surface::SurfacePoint;
 use plait_core::weave::{
-    self, Design, Goal, Ground, Improvement, MeshSource, Options, QuadSize, Session, Stuck, WeaveError, Woven,
+    self, Design, Goal, Improvement, MeshRole, MeshSource, NoSuggestion, Options, QuadSize, Session, WeaveError, Woven,
 };
 
 use crate::engine::{
@@ -86,7 +86,7 @@ fn absolute(path: &Path) -> std::path::PathBuf {
 
 /// A proposal as the window shows it.
 fn proposal(model: &weave::Model, proposal: weave::Proposal) -> Proposal {
-    let polyline = model.shown(&proposal.curve);
+    let polyline = model.on_design_mesh(&proposal.curve);
     Proposal { curve: proposal.curve, cost: proposal.cost, energy: proposal.energy, polyline }
 }
 
@@ -99,13 +99,13 @@ fn failed(error: WeaveError, session: Option<&Session>) -> EngineError {
     let region = match &error {
         WeaveError::Cancelled(_) => return EngineError::Cancelled,
         WeaveError::Layout(LayoutError::RedRegions(red)) => red.first().copied(),
-        WeaveError::Stuck(Stuck::NoHelp { region, .. }) => Some(*region),
+        WeaveError::NoSuggestion(NoSuggestion::NoHelp { region, .. }) => Some(*region),
         _ => None,
     };
     let place = region.zip(session).and_then(|(r, s)| region_place(&s.woven().arrangement, r as usize));
     let message = match (&error, session) {
         (WeaveError::Layout(LayoutError::RedRegions(_)), Some(s)) => {
-            let reasons: Vec<_> = words::remains(s).into_iter().map(|r| r.text).collect();
+            let reasons: Vec<_> = words::remarks(s).into_iter().map(|r| r.text).collect();
             format!("there is no layout yet: {}", reasons.join("; "))
         }
         _ => error.to_string(),
@@ -227,7 +227,7 @@ impl Engine for SessionEngine {
     ) -> Result<Improvement, EngineError> {
         let Self { session, model, .. } = self;
         let mut show = |s: &Session, i: &Improvement| watch(Arc::new(model.scene(s, &Later::default())), *i);
-        let done = session.improve(weave::ROUNDS, progress, &mut show);
+        let done = session.improve(weave::IMPROVEMENT_ROUNDS, progress, &mut show);
         self.changed(done)
     }
 
@@ -311,7 +311,7 @@ impl Engine for SessionEngine {
             export.quads.quads.len()
         );
         let mut files = vec!["design.plait", "layout.obj", "quads.obj", "patches.obj", "report.json"];
-        if export.ground == Ground::Design {
+        if export.mesh_role == MeshRole::Design {
             files.insert(1, "layout.layout");
         }
         Ok(ExportReport { files: files.into_iter().map(|f| folder.join(f)).collect(), summary })

@@ -56,7 +56,7 @@ impl ModelSnapshot {
             index: Arc::clone(&model.index),
             surface: Arc::new(self.surface(session)),
             strips: strips.collect(),
-            remains: words::remains(session),
+            remarks: words::remarks(session),
             summary,
             exportable,
             layout: later.preview(session).map(Arc::new),

@@ -5,15 +5,15 @@ use plait_core::layout::QuadLayout;
 use plait_core::weave::{Improvement, Session};
 
 use super::region_place;
-use crate::engine::{RegionColor, Remark};
+use crate::engine::{RegionColour, Remark};
 
 /// The colour in the terms of the window.
-pub fn color(colour: Colour) -> RegionColor {
+pub fn color(colour: Colour) -> RegionColour {
     match colour {
-        Colour::None => RegionColor::None,
-        Colour::Yellow => RegionColor::Yellow,
-        Colour::Orange => RegionColor::Orange,
-        Colour::Red => RegionColor::Red,
+        Colour::None => RegionColour::None,
+        Colour::Yellow => RegionColour::Yellow,
+        Colour::Orange => RegionColour::Orange,
+        Colour::Red => RegionColour::Red,
     }
 }
 
@@ -29,15 +29,15 @@ pub fn improved(i: &Improvement) -> String {
         patches(i.after.patches),
         i.before.alignment,
         patches(i.before.patches),
-        i.after.price,
-        i.before.price,
+        i.after.objective,
+        i.before.objective,
     )
 }
 
 /// One remark for each kind of thing that is the matter, most urgent first, then most frequent.
-pub fn remains(session: &Session) -> Vec<Remark> {
+pub fn remarks(session: &Session) -> Vec<Remark> {
     if session.design().strips.is_empty() {
-        return vec![Remark { color: RegionColor::Red, text: "No strip is placed yet".into(), place: None }];
+        return vec![Remark { color: RegionColour::Red, text: "No strip is placed yet".into(), place: None }];
     }
     let woven = session.woven();
     let mut groups: Vec<(Colour, Kind, Vec<usize>)> = Vec::new();

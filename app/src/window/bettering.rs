@@ -6,16 +6,16 @@ use super::action::Action;
 use super::panels::wide_button;
 use super::{PlaitApp, theme};
 use crate::engine::Scene;
-use crate::worker::{Betters, Running, Steps};
+use crate::worker::{Running, Steps, StoppableWork};
 
 /// The button that tries other strips, or the progress of that.
 pub fn strips(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
-    if let Some(running) = app.bettering(Betters::Strips) {
+    if let Some(running) = app.bettering(StoppableWork::Strips) {
         let so_far = app.improvement.map(|i| {
             let (now, before) = (i.after, i.before);
             format!(
                 "Misfit {:.1}, before {:.1}\n{:.1}° off, {} patches · before {:.1}°, {}",
-                now.price, before.price, now.alignment, now.patches, before.alignment, before.patches
+                now.objective, before.objective, now.alignment, now.patches, before.alignment, before.patches
             )
         });
         ui.add_space(4.0);
@@ -27,7 +27,7 @@ pub fn strips(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
     } else {
         "Tries other strips, once the layout is valid"
     };
-    if wide_button(ui, "Improve the layout", false, app.can_better(), hint) {
+    if wide_button(ui, "Improve the layout", false, app.can_optimise(), hint) {
         actions.push(Action::Improve);
     }
 }

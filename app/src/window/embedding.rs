@@ -8,11 +8,11 @@ use super::panels::{remark_row, wide_button};
 use super::{PlaitApp, bettering, theme};
 use crate::distortion::{self, Colours};
 use crate::engine::{EmbeddingSummary, LayoutPart, LayoutPreview, Scene};
-use crate::worker::Betters;
+use crate::worker::StoppableWork;
 
 /// The button, or the progress of the work; then what was achieved.
 pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
-    if let Some(running) = app.bettering(Betters::Embedding) {
+    if let Some(running) = app.bettering(StoppableWork::Embedding) {
         let so_far = app.step.as_ref().map(|s| {
             let folds = if s.flipped == 1 { "fold" } else { "folds" };
             format!("Step {} · energy {:.0} % · {} {folds}", s.step, 100.0 * s.energy, s.flipped)
@@ -27,7 +27,7 @@ pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action
     } else {
         "Moves nodes and arcs, once the layout is valid"
     };
-    if wide_button(ui, text, false, app.can_better(), hint) {
+    if wide_button(ui, text, false, app.can_optimise(), hint) {
         actions.push(Action::Optimise);
     }
     pins(app.layout(), ui, actions);

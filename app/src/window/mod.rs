@@ -28,13 +28,13 @@ use crate::camera::Camera;
 use crate::distortion::Colours;
 use crate::engine::{
     Detail, EmbeddingStep, EmbeddingSummary, EngineError, ExportOptions, LayoutPart, LayoutPreview, Opener, Refinement,
-    RegionColor, Scene, Source, StripId,
+    RegionColour, Scene, Source, StripId,
 };
 use crate::input::Input;
 use crate::render::Renderer;
 use crate::shading;
 use crate::weaving::improved;
-use crate::worker::{Betters, Job, Reply, Running, Worker};
+use crate::worker::{Job, Reply, Running, StoppableWork, Worker};
 
 /// Work that takes longer shows a progress bar.
 const SHORT: Duration = Duration::from_millis(500);
@@ -172,7 +172,7 @@ impl PlaitApp {
     }
 
     /// The work on its way that makes this better step by step.
-    fn bettering(&self, what: Betters) -> Option<Running> {
+    fn bettering(&self, what: StoppableWork) -> Option<Running> {
         self.worker.running().filter(|r| r.steps.as_ref().is_some_and(|s| s.of == what))
     }
 
@@ -356,19 +356,19 @@ impl PlaitApp {
     }
 
     /// Whether there is a layout to be made better, and nobody at it.
-    fn can_better(&self) -> bool {
+    fn can_optimise(&self) -> bool {
         self.scene.as_ref().is_some_and(|s| s.exportable) && !self.is_bettering()
     }
 
     fn improve(&mut self) {
-        if self.can_better() {
+        if self.can_optimise() {
             self.improvement = None;
             self.change(Job::Improve);
         }
     }
 
     fn optimise(&mut self) {
-        if self.can_better() {
+        if self.can_optimise() {
             self.hover.clear();
             self.worker.request(Job::Optimise);
         }
@@ -387,7 +387,7 @@ impl PlaitApp {
             self.ask_with_name(Asked::Export, ctx);
             return;
         }
-        let urgent: Vec<_> = scene.remains.iter().filter(|r| r.color == RegionColor::Red).collect();
+        let urgent: Vec<_> = scene.remarks.iter().filter(|r| r.color == RegionColour::Red).collect();
         let reasons: Vec<_> = urgent.iter().map(|r| r.text.as_str()).collect();
         let text = format!("There is no layout to export yet: {}", reasons.join("; "));
         self.messages.add(Tone::Failed, text, urgent.iter().find_map(|r| r.place));

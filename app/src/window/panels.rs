@@ -172,7 +172,7 @@ fn menus(app: &PlaitApp, ui: &mut Ui, actions: &mut Vec<Action>) {
         let remove = app.selected.map(Action::Remove);
         item(ui, actions, "Remove strip", "Delete", remove.is_some(), remove.unwrap_or(Action::Select(None)));
         item(ui, actions, "Suggest a strip", "S", scene.is_some(), Action::Suggest);
-        let valid = app.can_better();
+        let valid = app.can_optimise();
         item(ui, actions, "Improve the layout", "I", valid, Action::Improve);
         item(ui, actions, "Optimise the embedding", "M", valid, Action::Optimise);
     });
@@ -259,7 +259,7 @@ fn side_panel(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Acti
     section(ui, "What remains");
     what_remains(scene, ui, actions);
     ui.add_space(4.0);
-    let useful = !scene.exportable || !scene.remains.is_empty();
+    let useful = !scene.exportable || !scene.remarks.is_empty();
     if wide_button(ui, "Suggest a strip", !scene.exportable, useful, "Places the strip that helps most now (S)") {
         actions.push(Action::Suggest);
     }
@@ -326,7 +326,7 @@ fn what_remains(scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action>) {
         .inner_margin(Margin::symmetric(12, 9));
     card.show(ui, |ui| {
         ui.set_width(ui.available_width());
-        for remark in &scene.remains {
+        for remark in &scene.remarks {
             remark_row(remark, rgb(region_rgb(remark.color)), ui, actions);
         }
         if !scene.summary.is_empty() {

@@ -65,10 +65,10 @@ impl Job {
     }
 
     /// What it makes better step by step, if it does.
-    pub(super) fn betters(&self) -> Option<Betters> {
+    pub(super) fn betters(&self) -> Option<StoppableWork> {
         match self {
-            Self::Improve => Some(Betters::Strips),
-            Self::Optimise => Some(Betters::Embedding),
+            Self::Improve => Some(StoppableWork::Strips),
+            Self::Optimise => Some(StoppableWork::Embedding),
             _ => None,
         }
     }
@@ -140,7 +140,7 @@ pub enum Reply {
 
 /// What is made better step by step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Betters {
+pub enum StoppableWork {
     /// The strips.
     Strips,
     /// The embedding of their layout.
@@ -151,7 +151,7 @@ pub enum Betters {
 #[derive(Debug, Clone)]
 pub struct Steps {
     /// What it makes better.
-    pub of: Betters,
+    pub of: StoppableWork,
     /// To be set in order to stop it and keep the best so far.
     pub stop: Arc<AtomicBool>,
 }

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use plait_core::surface::SurfacePoint;
 
-pub use messages::{Betters, Job, Reply, Running, Steps};
+pub use messages::{Job, Reply, Running, Steps, StoppableWork};
 use task::Loop;
 
 use crate::engine::Opener;

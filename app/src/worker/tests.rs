@@ -35,7 +35,7 @@ impl Opener for FakeOpener {
             design_mesh: Arc::new(mesh),
             surface: Arc::default(),
             strips: Vec::new(),
-            remains: Vec::new(),
+            remarks: Vec::new(),
             summary: String::new(),
             exportable: false,
             layout: None,

@@ -7,8 +7,8 @@
 
 use thiserror::Error;
 
-use super::insert::CurveInserter;
-use super::refined::{Mark, NONE, NoRoute, RefinedMesh, next};
+use super::curve_insertion::CurveInserter;
+use super::refined_mesh::{Mark, NONE, NoPath, RefinedMesh, next};
 use crate::mesh::{TriMesh, TriMeshError};
 use crate::surface::{CurveError, SurfaceCurve};
 
@@ -29,7 +29,7 @@ pub enum ArrangementError {
         /// Index of the curve.
         curve: usize,
         /// Where it failed.
-        source: NoRoute,
+        source: NoPath,
     },
     /// A vertex where other than two curves meet; the drawing rules exclude it.
     #[error("vertex {vertex} has {degree} curve edges")]
@@ -169,7 +169,7 @@ impl Arrangement {
         base: &TriMesh,
         curves: impl IntoIterator<Item = &'c SurfaceCurve>,
     ) -> Result<Self, ArrangementError> {
-        Self::sketch(base, curves)?.complete()
+        Self::unsubdivided(base, curves)?.complete()
     }
 
     /// The arrangement of curves that are drawn already, as marked edges of a mesh that has all vertices of the surface
@@ -178,7 +178,7 @@ impl Arrangement {
     /// # Errors
     ///
     /// When the marked edges are not those of curves that cross transversally.
-    pub(crate) fn of_drawn(refined: RefinedMesh, n_base_vertices: usize) -> Result<Self, ArrangementError> {
+    pub(crate) fn from_marked_mesh(refined: RefinedMesh, n_base_vertices: usize) -> Result<Self, ArrangementError> {
         Self::read(refined, n_base_vertices)?.complete()
     }
 
@@ -187,7 +187,7 @@ impl Arrangement {
     /// # Errors
     ///
     /// As [`Self::new`].
-    pub fn sketch<'c>(
+    pub fn unsubdivided<'c>(
         base: &TriMesh,
         curves: impl IntoIterator<Item = &'c SurfaceCurve>,
     ) -> Result<Self, ArrangementError> {
@@ -253,19 +253,19 @@ impl Arrangement {
     }
 
     /// The half-edges of a curve in order, in one of its two directions: from end to end, or once around.
-    pub fn course(&self, curve: u32) -> Vec<u32> {
+    pub fn curve_halfedges(&self, curve: u32) -> Vec<u32> {
         let refined = &self.refined;
         let of_curve = |h: &u32| refined.mark(*h) == Mark::Curve(curve);
         let end = self.ends.iter().find_map(|e| refined.outgoing(e.vertex).into_iter().find(of_curve));
         let inner = || self.segments.iter().find(|s| s.curve == curve).and_then(|s| s.halfedges.first().copied());
         let Some(first) = end.or_else(inner) else { return Vec::new() };
-        let mut course = vec![first];
+        let mut curve_halfedges = vec![first];
         let mut h = first;
         while let Some(onward) = self.straight_on(h).filter(|&g| g != first) {
-            course.push(onward);
+            curve_halfedges.push(onward);
             h = onward;
         }
-        course
+        curve_halfedges
     }
 
     /// The half-edge in which a curve goes on after another of its half-edges; `None` at its end.

@@ -7,8 +7,8 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
+use super::alignment_cost::Weights;
 use super::unfold::{Corners, EdgeCrossing, Geodesic, Unfolding};
-use super::weights::Weights;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 

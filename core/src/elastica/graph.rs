@@ -16,10 +16,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::alignment_cost::Weights;
 use super::geodesics::{Pair, geodesics};
-use super::steps::Window;
+use super::step_costs::Window;
 use super::unfold::{Corners, direction_in_face};
-use super::weights::Weights;
 use crate::mesh::{TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::PrincipalCurvature;

@@ -5,29 +5,29 @@
 //! direction and turning has a price. This room may use the mesh and the surface, and knows neither strips nor
 //! the user.
 
-mod anchors;
-mod boundary;
-mod classes;
-mod direction;
+mod alignment_cost;
+mod anchored_loops;
+mod bidirectional;
+mod bucket_queue;
+mod curve_neighbourhood;
 mod geodesics;
 mod graph;
+mod homology;
+mod initial_loop;
 mod mask;
+mod open_curves;
 mod proposals;
-mod queue;
 mod search;
-mod seed;
-mod stars;
-mod steps;
+mod start_directions;
+mod step_costs;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod unfold;
-mod vicinity;
-mod weights;
 
-pub use anchors::{Anchor, AnchorQuery};
-pub use classes::LoopClasses;
+pub use anchored_loops::{Anchor, AnchorQuery};
 pub use graph::{ElasticaError, ElasticaGraph, ElasticaOptions};
+pub use homology::HomologyClasses;
 pub use mask::DirectionMask;
 pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals};
 pub use search::SearchWorkspace;

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::classes::LoopClasses;
+use super::curve_neighbourhood::Vicinity;
 use super::graph::{ElasticaGraph, State};
+use super::homology::HomologyClasses;
 use super::mask::DirectionMask;
 use super::search::{Ball, LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
-use super::vicinity::Vicinity;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::surface::SurfaceCurve;
@@ -52,7 +52,7 @@ pub struct ProposalQuery<'a> {
     /// Alternatives keep this distance somewhere from every cheaper loop (in mesh units, measured along edges).
     pub separation: f64,
     /// Of the loops of one class that pass the vertex in about the same direction only the cheapest is wanted.
-    pub classes: Option<&'a LoopClasses>,
+    pub classes: Option<&'a HomologyClasses>,
     /// A loop found nearby under the same mask: the search starts from what it becomes where it passes the vertex.
     pub nearby: Option<&'a FoundLoop>,
     /// Most search states to settle before the best so far is returned unproved. A state takes about a
@@ -149,7 +149,7 @@ impl ElasticaGraph {
         progress: &Progress,
         watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<Proposals, Cancelled> {
-        self.prepare(progress)?;
+        self.prepare_boundary_costs(progress)?;
         let mut search = LoopSearch {
             graph: self,
             mask: query.mask,

@@ -15,12 +15,12 @@
 
 use std::sync::Mutex;
 
-use super::boundary::ExitMemory;
+use super::bucket_queue::Queue;
+use super::curve_neighbourhood::Vicinity;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
-use super::queue::Queue;
-use super::stars::Fan;
-use super::vicinity::Vicinity;
+use super::open_curves::ExitMemory;
+use super::start_directions::Fan;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 

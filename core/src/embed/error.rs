@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::trace::arcs::TraceError;
-use super::trace::completion::EmergeError;
+use super::trace::completion::CompletionError;
 use super::trace::rectangles::RectangleError;
 use crate::field::FieldError;
 use crate::layout::PatchError;
@@ -52,13 +52,13 @@ pub enum EmbeddingError {
     Trace(#[from] TraceError),
     /// The arcs missing from a partial layout do not emerge from the map.
     #[error("the missing arcs do not emerge: {0}")]
-    Emerge(#[from] EmergeError),
+    Emerge(#[from] CompletionError),
     /// The patches are not the rectangles the layout says.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
     /// What is left without collapsed chords could not be drawn.
     #[error(transparent)]
-    Redraw(#[from] crate::layout::RedrawError),
+    Redraw(#[from] crate::layout::ReembeddingError),
     /// The mesh could not be simplified to embed the layout on that first.
     #[error(transparent)]
     Proxy(#[from] crate::proxy::ProxyError),

@@ -20,15 +20,17 @@ mod topology;
 mod trace;
 
 pub use error::EmbeddingError;
-pub use optimise::optimiser::Optimizer;
-pub use optimise::relocation::Hold;
+pub use optimise::optimiser::Optimiser;
+pub use optimise::relocation::NodeConstraint;
 pub use parameterise::quality::{Measures, PatchMeasures, TriangleMeasure, measure_map, measure_patches};
 pub use parameterise::state::State;
-pub use pipeline::chord_collapse::{CollapsedChord, ShortChord};
-pub use pipeline::fit_prediction::{Foreseen, foresee};
+pub use pipeline::chord_collapse::{CollapsedChord, UncollapsedChord};
+pub use pipeline::fit_prediction::{PredictedFit, predict_fit};
 pub use pipeline::optimise::optimise;
-pub use problem::{Embedded, EmbeddingReport, FeatureEdges, Job, Next, RemainingFold, Settings, Snapshot, Surface};
-pub use topology::embedding_topology::{Headings, Net, NetArc, NetNode, headings};
-pub use trace::arcs::{ArcChain, Folds, TraceError, Traced, preview_arcs, trace_arcs};
-pub use trace::completion::{EmergeError, Emerged, emerge};
+pub use problem::{
+    EmbeddingReport, FeatureEdges, Next, OptimisedEmbedding, Problem, RemainingFlip, Settings, Snapshot, Surface,
+};
+pub use topology::embedding_topology::{ArcHeadings, EmbeddingTopology, TopologyArc, TopologyNode, arc_headings};
+pub use trace::arcs::{ArcChain, FlippedTriangles, TraceError, TracedLayout, preview_arcs, trace_arcs};
+pub use trace::completion::{CompletedLayout, CompletionError, complete_layout};
 pub use trace::rectangles::{RectangleError, map_rectangles};

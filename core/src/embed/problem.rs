@@ -4,8 +4,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::embed::parameterise::quality::Measures;
-use crate::embed::pipeline::chord_collapse::{CollapsedChord, ShortChord};
-use crate::embed::topology::embedding_topology::Headings;
+use crate::embed::pipeline::chord_collapse::{CollapsedChord, UncollapsedChord};
+use crate::embed::topology::embedding_topology::ArcHeadings;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::TriMesh;
 use crate::surface::{PrincipalCurvature, SurfaceIndex};
@@ -62,15 +62,15 @@ impl Default for Settings {
 
 /// A layout to be embedded.
 #[derive(Debug, Clone, Copy)]
-pub struct Job<'a> {
+pub struct Problem<'a> {
     /// The surface.
     pub surface: Surface<'a>,
     /// The layout's structure; without patches where arcs are missing.
     pub layout: &'a QuadLayout,
     /// A rough drawing of it.
-    pub drawing: &'a Embedding,
+    pub initial_embedding: &'a Embedding,
     /// The headings of the arcs' sides in the charts of the regions between them.
-    pub headings: &'a [Headings],
+    pub arc_headings: &'a [ArcHeadings],
     /// Nodes that are to stay where the drawing has them; empty: none.
     pub pinned_nodes: &'a [bool],
     /// Arcs whose ends are to stay where the drawing has them; empty: none. Between its ends an arc is an isoline.
@@ -106,7 +106,7 @@ pub enum Next {
 
 /// A triangle that the map turns over in the end.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RemainingFold {
+pub struct RemainingFlip {
     /// A point in it.
     pub at: [f64; 3],
     /// Why it could not be unfolded.
@@ -127,11 +127,11 @@ pub struct EmbeddingReport {
     /// Triangles turned over when the nodes had come to rest, before folds were removed.
     pub flipped_at_rest: usize,
     /// Those left.
-    pub folds: Vec<RemainingFold>,
+    pub folds: Vec<RemainingFlip>,
     /// Chords that were collapsed, in order.
     pub collapsed: Vec<CollapsedChord>,
     /// Chords that were to be collapsed and could not be.
-    pub short: Vec<ShortChord>,
+    pub short: Vec<UncollapsedChord>,
     /// Edges of features.
     pub features: FeatureEdges,
     /// Measures of all patches together.
@@ -152,7 +152,7 @@ pub struct FeatureEdges {
 
 /// A layout with its optimised embedding.
 #[derive(Debug, Clone)]
-pub struct Embedded {
+pub struct OptimisedEmbedding {
     /// The layout; of a partial one, with the arcs and nodes that have emerged after those given.
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
@@ -160,7 +160,7 @@ pub struct Embedded {
     /// The maps of its patches.
     pub maps: Vec<PatchMap>,
     /// Where chords were collapsed, the rough drawing of what was left of the layout.
-    pub drawing: Option<Embedding>,
+    pub initial_embedding: Option<Embedding>,
     /// What was achieved.
     pub report: EmbeddingReport,
 }

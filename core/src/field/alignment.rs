@@ -9,7 +9,7 @@
 //! distance inverse to `κ₁ − κ₂`, of about the radius of the bend, fine detail aligns the field near it and a
 //! gentle bend over a wide area.
 
-use crate::field::{Guide, RELIABLE};
+use crate::field::{DirectionPenalty, RELIABLE_PENALTY};
 use crate::mesh::{FaceId, TriMesh};
 use crate::surface::Metric;
 use crate::surface::PrincipalCurvature;
@@ -42,14 +42,14 @@ const EQUILATERAL: f64 = 1.732_050_807_568_877_2;
 /// The reliable principal directions, by triangle, for a map of least squares or one that is `whole`, without folds.
 /// `curvature` has an entry per vertex, `sharp` a flag per edge (empty: none). Corners on sharp edges tell nothing of the
 /// smooth surface beside them and are left out.
-pub fn shape_guides(
+pub fn principal_direction_penalties(
     mesh: &TriMesh,
     metric: &Metric,
     curvature: &[PrincipalCurvature],
     sharp: &[bool],
     whole: bool,
-) -> Vec<Guide> {
-    let strength = if whole && !is_creased(mesh, sharp) { STRENGTH_WHOLE } else { STRENGTH };
+) -> Vec<DirectionPenalty> {
+    let strength = if whole && !is_feature_dominated(mesh, sharp) { STRENGTH_WHOLE } else { STRENGTH };
     let mut on_crease = vec![false; mesh.n_vertices()];
     for e in mesh.edges().filter(|e| sharp.get(e.index()).copied().unwrap_or(false)) {
         for v in mesh.edge_vertices(e) {
@@ -60,13 +60,13 @@ pub fn shape_guides(
     let guide = |face: FaceId| {
         let pull = pull(&bending[face.index()], strength)?;
         let angle = metric.angle_of(mesh, face, bending[face.index()].d_max)?;
-        Some(Guide { face, angle, weight: pull * metric.area(face) / EQUILATERAL, branch: None })
+        Some(DirectionPenalty { face, angle, weight: pull * metric.area(face) / EQUILATERAL, branch: None })
     };
     mesh.faces().filter_map(guide).collect()
 }
 
 /// Whether features carry the shape of a surface; a flag per edge (empty: none).
-pub(crate) fn is_creased(mesh: &TriMesh, sharp: &[bool]) -> bool {
+pub(crate) fn is_feature_dominated(mesh: &TriMesh, sharp: &[bool]) -> bool {
     let length: f64 = mesh.edges().zip(sharp).filter(|(_, sharp)| **sharp).map(|(e, _)| mesh.edge_length(e)).sum();
     let area: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
     length > CREASED * area.sqrt()
@@ -88,9 +88,16 @@ fn ramp(x: f64, [from, to]: [f64; 2]) -> f64 {
 
 /// The directions of the edges marked in `along` (features, boundaries to be followed; one flag per edge), one for
 /// each triangle at each edge, all of full weight.
-pub fn feature_guides(mesh: &TriMesh, metric: &Metric, along: &[bool]) -> Vec<Guide> {
+pub fn feature_direction_penalties(mesh: &TriMesh, metric: &Metric, along: &[bool]) -> Vec<DirectionPenalty> {
     let marked = mesh.halfedges().filter(|&h| along[mesh.edge(h).index()]);
-    marked.map(|h| Guide { face: mesh.face(h), angle: metric.direction(h), weight: RELIABLE, branch: None }).collect()
+    marked
+        .map(|h| DirectionPenalty {
+            face: mesh.face(h),
+            angle: metric.direction(h),
+            weight: RELIABLE_PENALTY,
+            branch: None,
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -100,15 +107,15 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::field::{Guides, samples::octasphere, shape_field};
+    use crate::field::{AlignmentDirections, feature_aligned_field, samples::octasphere};
     use crate::mesh::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edges};
     use crate::progress::Progress;
     use crate::surface::principal_curvature;
     use crate::testing::{grid, square};
 
-    fn guides(mesh: &TriMesh) -> Vec<Guide> {
+    fn guides(mesh: &TriMesh) -> Vec<DirectionPenalty> {
         let curvature = principal_curvature(mesh, 0.03, &vec![false; mesh.n_edges()]);
-        shape_guides(mesh, &Metric::new(mesh), &curvature, &[], false)
+        principal_direction_penalties(mesh, &Metric::new(mesh), &curvature, &[], false)
     }
 
     /// How far an angle is from a multiple of a quarter turn.
@@ -148,7 +155,10 @@ mod tests {
         let (metric, none) = (Metric::new(&tube), vec![false; tube.n_edges()]);
         let curvature = principal_curvature(&tube, 0.03, &none);
         let weight = |sharp: &[bool], whole| {
-            shape_guides(&tube, &metric, &curvature, sharp, whole).iter().map(|g| g.weight).sum::<f64>()
+            principal_direction_penalties(&tube, &metric, &curvature, sharp, whole)
+                .iter()
+                .map(|g| g.weight)
+                .sum::<f64>()
         };
         let stronger = (STRENGTH_WHOLE / STRENGTH).powi(2);
         assert!((weight(&none, true) / weight(&none, false) / stronger - 1.0).abs() < 1e-9);
@@ -168,14 +178,14 @@ mod tests {
         let mesh = square(3);
         let metric = Metric::new(&mesh);
         let along: Vec<bool> = mesh.edges().map(|e| mesh.is_boundary_edge(e)).collect();
-        let found = feature_guides(&mesh, &metric, &along);
+        let found = feature_direction_penalties(&mesh, &metric, &along);
         assert_eq!(found.len(), 12);
         for g in &found {
             let tangent = metric.tangent(&mesh, g.face, g.angle);
-            assert!(tangent.x.abs().max(tangent.y.abs()) > 1.0 - 1e-12 && g.weight == RELIABLE);
+            assert!(tangent.x.abs().max(tangent.y.abs()) > 1.0 - 1e-12 && g.weight == RELIABLE_PENALTY);
         }
         let inner: Vec<bool> = along.iter().map(|a| !a).collect();
-        assert_eq!(feature_guides(&mesh, &metric, &inner).len(), 2 * inner.iter().filter(|&&i| i).count());
+        assert_eq!(feature_direction_penalties(&mesh, &metric, &inner).len(), 2 * inner.iter().filter(|&&i| i).count());
     }
 
     #[test]
@@ -193,7 +203,7 @@ mod tests {
         let mut sharp = sharp_edges(&mesh, SHARP_DIHEDRAL);
         drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
-        let found = shape_guides(&mesh, &metric, &curvature, &sharp, false);
+        let found = principal_direction_penalties(&mesh, &metric, &curvature, &sharp, false);
         let bending = face_curvature(&mesh, &curvature, |_| true);
         let (mut directions, mut weights) = (vec![DVec3::ZERO; mesh.n_faces()], vec![0.0; mesh.n_faces()]);
         for g in &found {
@@ -201,8 +211,8 @@ mod tests {
             weights[g.face.index()] = g.weight * EQUILATERAL / metric.area(g.face);
         }
         let of = |weights: &[f64]| {
-            let guides = Guides { directions: &directions, weights, radius: 1.0 };
-            let field = shape_field(&mesh, &metric, Some(guides), &sharp, &Progress::new()).unwrap();
+            let guides = AlignmentDirections { directions: &directions, weights, radius: 1.0 };
+            let field = feature_aligned_field(&mesh, &metric, Some(guides), &sharp, &Progress::new()).unwrap();
             let (mut sum, mut total) = (0.0, 0.0);
             for (f, c) in mesh.faces().zip(&bending) {
                 let weight = (c.k_max - c.k_min).powi(2) * metric.area(f);

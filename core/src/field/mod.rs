@@ -3,29 +3,31 @@
 //! The room for four-fold symmetric direction fields on meshes. It may use `mesh`, `surface`, `solve` and `progress`.
 
 mod alignment;
-mod cross;
-mod curves;
-mod guided;
-mod jumps;
+mod cross_field;
+mod edge_paths;
+mod feature_aligned;
+mod guiding_field;
+mod period_jumps;
 #[cfg(test)]
 pub(crate) mod samples;
-mod shape;
-mod singular;
+mod singularities;
 mod sizing;
-mod smooth;
+mod smoothing;
 #[cfg(test)]
 mod tests;
 
 use thiserror::Error;
 
-pub(crate) use alignment::is_creased;
-pub use alignment::{feature_guides, shape_guides};
-pub use cross::{CrossField, interpolate};
-pub use curves::{EdgePath, Step, trace_curves};
-pub use guided::{Guide, GuidedField, GuidedSystem, RELIABLE, cross_field, indices, turning_number};
-pub use shape::{Guides, shape_field};
-pub use singular::{Singularity, pronounced};
-pub use sizing::{SizingSystem, rest_turns};
+pub(crate) use alignment::is_feature_dominated;
+pub use alignment::{feature_direction_penalties, principal_direction_penalties};
+pub use cross_field::{CrossField, interpolate};
+pub use edge_paths::{EdgePath, Step, trace_curves};
+pub use feature_aligned::{AlignmentDirections, feature_aligned_field};
+pub use guiding_field::{
+    DirectionPenalty, GuidingField, GuidingFieldSystem, RELIABLE_PENALTY, cross_field, indices, turning_number,
+};
+pub use singularities::{Singularity, pronounced};
+pub use sizing::{SizingSystem, residual_rotations};
 
 use crate::mesh::{EdgeId, VertexId};
 use crate::progress::Cancelled;

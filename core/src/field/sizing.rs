@@ -31,7 +31,7 @@ const ROUNDS: usize = 3;
 /// For each edge what the cross turns from the triangle of [`TriMesh::halfedge`] to that of its twin beyond the
 /// period jump; 0 on the boundary. `jump` has whole numbers, not reduced modulo four, and what is left is not
 /// reduced either.
-pub fn rest_turns(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<f64> {
+pub fn residual_rotations(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<f64> {
     let rest = |e: EdgeId| {
         let h = mesh.halfedge(e);
         let Some(t) = mesh.twin(h) else { return 0.0 };
@@ -78,7 +78,7 @@ impl SizingSystem {
 
     /// The lengths that the gradients of u and of v should have in each triangle; such that the map keeps the area of
     /// the whole. Both are the same: with two scales, free of curl each along one direction only, they would be tied
-    /// to the field's topology by their exchange across odd jumps. `rest` as from [`rest_turns`].
+    /// to the field's topology by their exchange across odd jumps. `rest` as from [`residual_rotations`].
     ///
     /// # Errors
     ///
@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
     use crate::field::samples::{cells, octasphere};
-    use crate::field::{CrossField, interpolate, shape_field};
+    use crate::field::{CrossField, feature_aligned_field, interpolate};
     use crate::mesh::sharp_edges;
     use crate::progress::Progress;
     use crate::testing::grid;
@@ -151,7 +151,7 @@ mod tests {
 
     /// The jumps, not reduced, that leave the smallest rests.
     fn whole_jumps(mesh: &TriMesh, metric: &Metric, angle: &[f64]) -> Vec<i32> {
-        let turns = rest_turns(mesh, metric, angle, &vec![0; mesh.n_edges()]);
+        let turns = residual_rotations(mesh, metric, angle, &vec![0; mesh.n_edges()]);
         turns.iter().map(|t| (t / FRAC_PI_2).round() as i32).collect()
     }
 
@@ -170,7 +170,7 @@ mod tests {
             })
             .collect();
         let field = interpolate(&mesh, &metric, &[], &circles, &Progress::new()).unwrap();
-        let rest = rest_turns(&mesh, &metric, &field.angle, &whole_jumps(&mesh, &metric, &field.angle));
+        let rest = residual_rotations(&mesh, &metric, &field.angle, &whole_jumps(&mesh, &metric, &field.angle));
         let size = SizingSystem::new(&mesh, &metric, None).unwrap().lengths(&mesh, &metric, &rest).unwrap();
         let before = curl(&mesh, &metric, &field, &vec![[1.0; 2]; mesh.n_faces()]);
         (before / curl(&mesh, &metric, &field, &size), size, mesh)
@@ -193,8 +193,8 @@ mod tests {
     fn a_cube_needs_no_other_lengths_and_a_sphere_needs_longer_ones_at_its_corners() {
         let lengths = |mesh: &TriMesh, sharp: &[bool]| {
             let metric = Metric::new(mesh);
-            let field = shape_field(mesh, &metric, None, sharp, &Progress::new()).unwrap();
-            let rest = rest_turns(mesh, &metric, &field.angle, &whole_jumps(mesh, &metric, &field.angle));
+            let field = feature_aligned_field(mesh, &metric, None, sharp, &Progress::new()).unwrap();
+            let rest = residual_rotations(mesh, &metric, &field.angle, &whole_jumps(mesh, &metric, &field.angle));
             (SizingSystem::new(mesh, &metric, None).unwrap().lengths(mesh, &metric, &rest).unwrap(), metric, field)
         };
         let cube = cells(&[[0, 0, 0]], 6);
@@ -219,8 +219,8 @@ mod tests {
         let faces: Vec<[u32; 3]> = first.faces().map(|f| first.face_vertices(f).map(|v| v.0)).collect();
         let second = TriMesh::from_faces(second, &faces).unwrap();
         let metric = Metric::new(&second);
-        let field = shape_field(&second, &metric, None, &[], &Progress::new()).unwrap();
-        let rest = rest_turns(&second, &metric, &field.angle, &whole_jumps(&second, &metric, &field.angle));
+        let field = feature_aligned_field(&second, &metric, None, &[], &Progress::new()).unwrap();
+        let rest = residual_rotations(&second, &metric, &field.angle, &whole_jumps(&second, &metric, &field.angle));
         let reused = SizingSystem::new(&first, &Metric::new(&first), None).unwrap().symbolic();
         let lengths =
             |symbolic| SizingSystem::new(&second, &metric, symbolic).unwrap().lengths(&second, &metric, &rest);

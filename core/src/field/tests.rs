@@ -11,7 +11,7 @@ fn sum(s: &[Singularity]) -> i64 {
 }
 
 fn shape(mesh: &TriMesh) -> CrossField {
-    shape_field(mesh, &Metric::new(mesh), None, &[], &Progress::new()).unwrap()
+    feature_aligned_field(mesh, &Metric::new(mesh), None, &[], &Progress::new()).unwrap()
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn transport_around_a_vertex_is_its_curvature() {
     for v in mesh.vertices() {
         let around: f64 =
             mesh.outgoing(v).map(|h| mesh.prev(h)).map(|h| metric.transport(h, mesh.twin(h).unwrap())).sum();
-        assert!(jumps::wrap(around - metric.curvature(&mesh, v)).abs() < 1e-9);
+        assert!(period_jumps::wrap(around - metric.curvature(&mesh, v)).abs() < 1e-9);
     }
 }
 
@@ -119,8 +119,8 @@ fn guides_turn_the_field() {
         .collect();
     let weights = vec![1.0; mesh.n_faces()];
     for (radius, most) in [(0.01, true), (10.0, false)] {
-        let guides = Guides { directions: &directions, weights: &weights, radius };
-        let field = shape_field(&mesh, &metric, Some(guides), &[], &Progress::new()).unwrap();
+        let guides = AlignmentDirections { directions: &directions, weights: &weights, radius };
+        let field = feature_aligned_field(&mesh, &metric, Some(guides), &[], &Progress::new()).unwrap();
         let near = |f: &crate::mesh::FaceId| {
             (0..4).any(|b| field.direction(&mesh, &metric, *f, b).dot(directions[f.index()]) > 0.99)
         };
@@ -141,14 +141,14 @@ fn sharp_edges_are_followed() {
             n[0].dot(n[1]) < 0.5
         })
         .collect();
-    let field = shape_field(&mesh, &metric, None, &sharp, &Progress::new()).unwrap();
+    let field = feature_aligned_field(&mesh, &metric, None, &sharp, &Progress::new()).unwrap();
     assert_eq!(field.singularities.len(), 8);
     for e in mesh.edges().filter(|e| sharp[e.index()]) {
         let h = mesh.halfedge(e);
         let best = field.direction(&mesh, &metric, mesh.face(h), field.branch_along(&metric, h, 0.0));
         assert!(best.dot(mesh.vector(h).normalize()) > 1.0 - 1e-9);
     }
-    assert!(shape_field(&mesh, &metric, None, &sharp[1..], &Progress::new()).is_err());
+    assert!(feature_aligned_field(&mesh, &metric, None, &sharp[1..], &Progress::new()).is_err());
 }
 
 #[test]

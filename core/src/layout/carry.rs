@@ -6,12 +6,12 @@
 
 use glam::DVec3;
 
-use super::dual::{Dual, Line};
+use super::dual::{Dual, DualCurve};
 use super::initial_embedding::{Embedding, embed};
 use super::matching::{Matching, matching};
-use super::redraw::RedrawError;
+use super::redraw::ReembeddingError;
 use super::structure::QuadLayout;
-use crate::dual::{Arrangement, Mark, RefinedMesh, untangle};
+use crate::dual::{Arrangement, Mark, RefinedMesh, remove_bigons};
 use crate::mesh::{TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
@@ -21,14 +21,14 @@ use crate::surface::SurfaceCurve;
 ///
 /// # Errors
 ///
-/// See [`RedrawError`].
+/// See [`ReembeddingError`].
 pub fn carry(
     (layout, drawing, n_surface): (&QuadLayout, &Embedding, usize),
     to: &TriMesh,
-    carried: impl Fn(&Line) -> Option<SurfaceCurve>,
+    carried: impl Fn(&DualCurve) -> Option<SurfaceCurve>,
     place: impl Fn(usize) -> Option<VertexId>,
     progress: &Progress,
-) -> Result<Option<Embedding>, RedrawError> {
+) -> Result<Option<Embedding>, ReembeddingError> {
     let here = Dual::new(layout, drawing, &vec![false; layout.chords], n_surface, progress)?;
     let mut curves = Vec::with_capacity(layout.chords);
     for chord in 0..layout.chords as u32 {
@@ -38,7 +38,7 @@ pub fn carry(
             None => return Ok(None),
         }
     }
-    untangle(to, &mut curves);
+    remove_bigons(to, &mut curves);
     let there = Arrangement::new(to, &curves)?;
     let (wanted, found) = (layout.patches.len(), there.crossings.len());
     let dual = match QuadLayout::dual(&there, &[], layout.euler()) {

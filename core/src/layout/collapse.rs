@@ -19,7 +19,7 @@ const BOUNDARY: std::ops::RangeInclusive<usize> = 1..=3;
 
 /// A layout without some of its chords, and what became of the parts of the one before.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Collapsed {
+pub struct CollapsedLayout {
     /// What is left.
     pub layout: QuadLayout,
     /// For each node before the one that it has become.
@@ -80,7 +80,7 @@ impl QuadLayout {
     /// # Errors
     ///
     /// See [`CollapseError`].
-    pub fn collapse(&self, chord: u32) -> Result<Collapsed, CollapseError> {
+    pub fn collapse(&self, chord: u32) -> Result<CollapsedLayout, CollapseError> {
         if chord as usize >= self.chords {
             return Err(CollapseError::Unknown(chord));
         }
@@ -94,7 +94,7 @@ impl QuadLayout {
     /// # Errors
     ///
     /// See [`CollapseError`].
-    pub fn without(&self, gone: &[bool]) -> Result<Collapsed, CollapseError> {
+    pub fn without(&self, gone: &[bool]) -> Result<CollapsedLayout, CollapseError> {
         let is_gone = |arc: u32| gone[self.arcs[arc as usize].chord as usize];
         let euler = self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64;
         let (nodes, merged) = self.merged_nodes(&is_gone);
@@ -140,7 +140,7 @@ impl QuadLayout {
                 chords[self.arcs[a].chord as usize] = Some(layout.arcs[arc as usize].chord);
             }
         }
-        Ok(Collapsed { layout, nodes, arcs, patches, chords })
+        Ok(CollapsedLayout { layout, nodes, arcs, patches, chords })
     }
 
     /// The new number of every node, and the nodes that become each new one.

@@ -6,10 +6,10 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::RedrawError;
+use super::ReembeddingError;
 use super::initial_embedding::{Embedding, lengths, round_map};
-use super::patch::{Lookup, border_sides, flood};
-use super::piece::Piece;
+use super::patch::{ArcLookup, patch_faces, patch_sides};
+use super::piece::Submesh;
 use super::structure::QuadLayout;
 use crate::dual::{Arrangement, Mark, RefinedMesh};
 use crate::mesh::{FaceId, TriMesh};
@@ -29,7 +29,7 @@ pub(super) struct Dual {
 
 /// A curve on a surface: its points, each with the triangle in which it goes on to the next.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub struct DualCurve {
     /// The points.
     pub points: Vec<(DVec3, FaceId)>,
     /// Whether it goes on from the last to the first; else it goes from boundary to boundary.
@@ -41,47 +41,49 @@ impl Dual {
     ///
     /// # Errors
     ///
-    /// See [`RedrawError`].
+    /// See [`ReembeddingError`].
     pub(super) fn new(
         layout: &QuadLayout,
         drawing: &Embedding,
         gone: &[bool],
         n_surface: usize,
         progress: &Progress,
-    ) -> Result<Self, RedrawError> {
+    ) -> Result<Self, ReembeddingError> {
         let drawing = with_inner_vertices(drawing)?;
         let middles: Vec<u32> = drawing.arcs.iter().map(|path| middle(&drawing.mesh.positions, path)).collect();
-        let lookup = Lookup::new(&drawing);
+        let lookup = ArcLookup::new(&drawing);
         let parts: Vec<DualPatch> = (0..layout.patches.len())
             .into_par_iter()
             .map(|p| {
                 progress.check()?;
                 DualPatch::build(layout, &drawing, &lookup, &middles, gone, p)
             })
-            .collect::<Result<_, RedrawError>>()?;
+            .collect::<Result<_, ReembeddingError>>()?;
         let (refined, base_face) = assemble(&drawing, &parts)?;
-        let arrangement = Arrangement::of_drawn(refined, n_surface)?;
+        let arrangement = Arrangement::from_marked_mesh(refined, n_surface)?;
         Ok(Self { arrangement, base_face, drawing, middles })
     }
 
     /// The curve of a chord.
-    pub(super) fn line(&self, chord: u32) -> Line {
+    pub(super) fn line(&self, chord: u32) -> DualCurve {
         let refined = &self.arrangement.refined;
         let face = |h: u32| FaceId(self.base_face[refined.base_face(h / 3) as usize]);
         let at = |v: u32| refined.positions[v as usize];
-        let course = self.arrangement.course(chord);
-        let mut points: Vec<(DVec3, FaceId)> = course.iter().map(|&h| (at(refined.origin(h)), face(h))).collect();
-        let ends = course.first().zip(course.last()).map(|(&a, &b)| (refined.origin(a), refined.target(b)));
+        let curve_halfedges = self.arrangement.curve_halfedges(chord);
+        let mut points: Vec<(DVec3, FaceId)> =
+            curve_halfedges.iter().map(|&h| (at(refined.origin(h)), face(h))).collect();
+        let ends =
+            curve_halfedges.first().zip(curve_halfedges.last()).map(|(&a, &b)| (refined.origin(a), refined.target(b)));
         let closed = ends.is_some_and(|(a, b)| a == b);
         if !closed {
-            points.extend(course.last().map(|&h| (at(refined.target(h)), face(h))));
+            points.extend(curve_halfedges.last().map(|&h| (at(refined.target(h)), face(h))));
         }
-        Line { points, closed }
+        DualCurve { points, closed }
     }
 }
 
 /// A drawing with the same parts, in which every arc has an inner vertex.
-fn with_inner_vertices(drawing: &Embedding) -> Result<Embedding, RedrawError> {
+fn with_inner_vertices(drawing: &Embedding) -> Result<Embedding, ReembeddingError> {
     let mut mesh = RefinedMesh::new(&drawing.mesh.to_mesh()?);
     for h in 0..3 * mesh.n_faces() as u32 {
         mesh.set_mark(h, drawing.mesh.mark(h));
@@ -92,7 +94,7 @@ fn with_inner_vertices(drawing: &Embedding) -> Result<Embedding, RedrawError> {
             let on_arc = |h: &u32| mesh.mark(*h) == Mark::Arc(arc as u32);
             let leaving = mesh.outgoing(a).into_iter().find(|h| mesh.target(*h) == b && on_arc(h));
             let arriving = || mesh.outgoing(b).into_iter().find(|h| mesh.target(*h) == a && on_arc(h));
-            let h = leaving.or_else(arriving).ok_or(RedrawError::Arc { arc })?;
+            let h = leaving.or_else(arriving).ok_or(ReembeddingError::Arc { arc })?;
             path.insert(1, mesh.split_edge(h, 0.5));
         }
     }
@@ -123,17 +125,17 @@ impl DualPatch {
     fn build(
         layout: &QuadLayout,
         drawing: &Embedding,
-        lookup: &Lookup,
+        lookup: &ArcLookup,
         middles: &[u32],
         gone: &[bool],
         p: usize,
-    ) -> Result<Self, RedrawError> {
+    ) -> Result<Self, ReembeddingError> {
         let on_arc = |h: u32| drawing.mesh.mark(h) != Mark::Free;
-        let faces = flood(&drawing.mesh, drawing.seeds[p], on_arc);
-        let piece = Piece::cut_out(&drawing.mesh, &faces, on_arc)?;
-        let sides = border_sides(layout, lookup, &piece, p).ok_or(RedrawError::Patch { patch: p })?;
+        let faces = patch_faces(&drawing.mesh, drawing.seeds[p], on_arc);
+        let piece = Submesh::cut_out(&drawing.mesh, &faces, on_arc)?;
+        let sides = patch_sides(layout, lookup, &piece, p).ok_or(ReembeddingError::Patch { patch: p })?;
         let mut mesh = RefinedMesh::new(&piece.mesh);
-        mesh.uv = round_map(&piece.mesh, &sides).map_err(|source| RedrawError::Solve { patch: p, source })?;
+        mesh.uv = round_map(&piece.mesh, &sides).map_err(|source| ReembeddingError::Solve { patch: p, source })?;
         for i in 0..2 {
             let ends = [i, i + 2].map(|k| layout.patches[p].sides[k].0);
             let chord = layout.arcs[ends[0] as usize].chord;
@@ -144,9 +146,9 @@ impl DualPatch {
                 let arc = layout.patches[p].sides[k].0 as usize;
                 sides[k].iter().copied().find(|&v| piece.whole[v as usize] == middles[arc])
             };
-            let (Some(from), Some(to)) = (at(i), at(i + 2)) else { return Err(RedrawError::Patch { patch: p }) };
-            mesh.draw((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
-                .map_err(|source| RedrawError::Draw { patch: p, source })?;
+            let (Some(from), Some(to)) = (at(i), at(i + 2)) else { return Err(ReembeddingError::Patch { patch: p }) };
+            mesh.insert_path((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
+                .map_err(|source| ReembeddingError::Draw { patch: p, source })?;
         }
         Ok(Self { mesh, whole: piece.whole, faces })
     }
@@ -154,7 +156,7 @@ impl DualPatch {
 
 /// Glues the patches together again, with only the dual curves marked; also tells the triangle of the surface that each
 /// face lies in.
-fn assemble(drawing: &Embedding, parts: &[DualPatch]) -> Result<(RefinedMesh, Vec<u32>), RedrawError> {
+fn assemble(drawing: &Embedding, parts: &[DualPatch]) -> Result<(RefinedMesh, Vec<u32>), ReembeddingError> {
     let mut positions = drawing.mesh.positions.clone();
     let (mut faces, mut base_face, mut marks) = (Vec::new(), Vec::new(), Vec::new());
     for part in parts {

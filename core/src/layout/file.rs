@@ -21,7 +21,7 @@ use thiserror::Error;
 use crate::mesh::{FaceId, MeshSource, TriMesh, VertexId, fingerprint};
 use crate::surface::{Crossing, SurfacePoint};
 
-pub use regions::{Drawing, DrawnCorner, DrawnRegion};
+pub use regions::{PartialCorner, PartialEmbedding, PartialRegion};
 
 /// Version of the file format.
 const VERSION: u32 = 1;
@@ -163,7 +163,7 @@ impl fmt::Display for Part {
 
 /// Why a layout cannot be drawn on a mesh. Nodes and arcs are counted from 0, as in the file.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum DrawError {
+pub enum PartialEmbeddingError {
     /// A node lies in a triangle that the mesh does not have.
     #[error("node {node} lies in triangle {}, which the mesh does not have", face.0)]
     UnknownFace {
@@ -386,8 +386,8 @@ impl LayoutFile {
     ///
     /// # Errors
     ///
-    /// See [`DrawError`].
-    pub fn draw(&self, mesh: &TriMesh) -> Result<Drawing, DrawError> {
-        Drawing::new(self, draw::draw(self, mesh)?)
+    /// See [`PartialEmbeddingError`].
+    pub fn draw(&self, mesh: &TriMesh) -> Result<PartialEmbedding, PartialEmbeddingError> {
+        PartialEmbedding::new(self, draw::draw(self, mesh)?)
     }
 }

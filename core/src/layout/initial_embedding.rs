@@ -13,9 +13,9 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::disc;
-use super::piece::Piece;
+use super::piece::Submesh;
 use super::structure::QuadLayout;
-use crate::dual::{Arrangement, Mark, NoRoute, RefinedMesh, Region, SideKind};
+use crate::dual::{Arrangement, Mark, NoPath, RefinedMesh, Region, SideKind};
 use crate::mesh::{TriMesh, TriMeshError, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::solve::SolveError;
@@ -25,7 +25,7 @@ const CORNER_TURN: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Why a layout could not be embedded.
 #[derive(Debug, Error)]
-pub enum EmbedError {
+pub enum InitialEmbeddingError {
     /// A region could not be cut out as a disc.
     #[error("region {region} is not a disc: {source}")]
     NoDisc {
@@ -48,7 +48,7 @@ pub enum EmbedError {
         /// The region.
         region: usize,
         /// Where it failed.
-        source: NoRoute,
+        source: NoPath,
     },
     /// An arc is incomplete, which would be a defect of the arrangement.
     #[error("arc {arc} has no two halves")]
@@ -87,13 +87,13 @@ pub struct Embedding {
 ///
 /// # Errors
 ///
-/// See [`EmbedError`].
+/// See [`InitialEmbeddingError`].
 pub fn embed(
     arrangement: &Arrangement,
     layout: &QuadLayout,
     preferred: &[Option<VertexId>],
     progress: &Progress,
-) -> Result<Embedding, EmbedError> {
+) -> Result<Embedding, InitialEmbeddingError> {
     let middles = middles(arrangement);
     let parts: Vec<RegionPart> = arrangement
         .regions
@@ -103,7 +103,7 @@ pub fn embed(
             progress.check()?;
             RegionPart::build(arrangement, r, region, preferred[r], &middles)
         })
-        .collect::<Result<_, EmbedError>>()?;
+        .collect::<Result<_, InitialEmbeddingError>>()?;
     assemble(arrangement, layout, &parts)
 }
 
@@ -142,10 +142,10 @@ impl RegionPart {
         region: &Region,
         preferred: Option<VertexId>,
         middles: &[u32],
-    ) -> Result<Self, EmbedError> {
+    ) -> Result<Self, InitialEmbeddingError> {
         let cut = |h: u32| arrangement.refined.mark(h) != Mark::Free;
-        let piece = Piece::cut_out(&arrangement.refined, &region.faces, cut)
-            .map_err(|source| EmbedError::NoDisc { region: r, source })?;
+        let piece = Submesh::cut_out(&arrangement.refined, &region.faces, cut)
+            .map_err(|source| InitialEmbeddingError::NoDisc { region: r, source })?;
         let border = &region.borders[0];
         let sides: Vec<Vec<u32>> = border
             .iter()
@@ -161,7 +161,7 @@ impl RegionPart {
         if stretch.is_none() && on_border == piece.mesh.n_vertices() {
             mesh.split_face(largest_face(&piece.mesh));
         }
-        let disc = mesh.to_mesh().map_err(|source| EmbedError::NoDisc { region: r, source })?;
+        let disc = mesh.to_mesh().map_err(|source| InitialEmbeddingError::NoDisc { region: r, source })?;
         let node = match stretch {
             Some(k) => boundary_node(&disc, &sides[k], |v| {
                 preferred.is_some_and(|p| piece.whole.get(v as usize) == Some(&p.0))
@@ -171,7 +171,7 @@ impl RegionPart {
                 .filter(|&v| !disc.is_boundary_vertex(VertexId::new(v)))
                 .map_or_else(|| innermost(&disc), |v| v as u32),
         };
-        mesh.uv = round_map(&disc, &sides).map_err(|source| EmbedError::Solve { region: r, source })?;
+        mesh.uv = round_map(&disc, &sides).map_err(|source| InitialEmbeddingError::Solve { region: r, source })?;
 
         let mut halves = Vec::new();
         for (k, side) in border.iter().enumerate() {
@@ -181,10 +181,10 @@ impl RegionPart {
             }
             let middle =
                 sides[k].iter().copied().find(|&v| piece.whole.get(v as usize) == Some(&middles[segment as usize]));
-            let middle = middle.ok_or(EmbedError::Halves { arc: segment as usize })?;
+            let middle = middle.ok_or(InitialEmbeddingError::Halves { arc: segment as usize })?;
             let path = mesh
-                .draw((node, middle), Mark::Arc(segment), |_, _| true, |_| true, |m, v| m.uv[v as usize])
-                .map_err(|source| EmbedError::Draw { region: r, source })?;
+                .insert_path((node, middle), Mark::Arc(segment), |_, _| true, |_| true, |m, v| m.uv[v as usize])
+                .map_err(|source| InitialEmbeddingError::Draw { region: r, source })?;
             halves.push((segment, forward, path));
         }
         if let Some(k) = stretch {
@@ -289,7 +289,11 @@ fn largest_face(mesh: &TriMesh) -> u32 {
 }
 
 /// Glues the regions together again.
-fn assemble(arrangement: &Arrangement, layout: &QuadLayout, parts: &[RegionPart]) -> Result<Embedding, EmbedError> {
+fn assemble(
+    arrangement: &Arrangement,
+    layout: &QuadLayout,
+    parts: &[RegionPart],
+) -> Result<Embedding, InitialEmbeddingError> {
     let mut positions: Vec<DVec3> = arrangement.refined.positions.clone();
     let mut faces = Vec::new();
     let mut base_face = Vec::new();
@@ -312,16 +316,16 @@ fn assemble(arrangement: &Arrangement, layout: &QuadLayout, parts: &[RegionPart]
     let mut mesh = RefinedMesh::new(&TriMesh::from_faces(positions, &faces)?);
     let mut arcs = Vec::with_capacity(halves.len());
     for (arc, pair) in halves.into_iter().enumerate() {
-        let [Some(mut path), Some(mut second)] = pair else { return Err(EmbedError::Halves { arc }) };
+        let [Some(mut path), Some(mut second)] = pair else { return Err(InitialEmbeddingError::Halves { arc }) };
         second.pop();
         path.extend(second.into_iter().rev());
         for w in path.windows(2) {
-            let h = mesh.find(w[0], w[1]).ok_or(EmbedError::Halves { arc })?;
+            let h = mesh.find(w[0], w[1]).ok_or(InitialEmbeddingError::Halves { arc })?;
             mesh.set_mark(h, Mark::Arc(arc as u32));
         }
         arcs.push(path);
     }
-    let seeds = arrangement.crossings.iter().map(|c| mesh.any_outgoing(c.vertex) / 3).collect();
+    let seeds = arrangement.crossings.iter().map(|c| mesh.vertex_halfedge(c.vertex) / 3).collect();
     let arc_parameters = arcs.iter().map(|path| lengths(&mesh.positions, path)).collect();
     Ok(Embedding { mesh, base_face, nodes, arcs, arc_parameters, seeds })
 }

@@ -19,16 +19,16 @@ mod structure;
 mod tests;
 
 pub use carry::carry;
-pub use collapse::{CollapseError, Collapsed};
+pub use collapse::{CollapseError, CollapsedLayout};
 pub(crate) use disc::flipped;
-pub use dual::Line;
+pub use dual::DualCurve;
 pub use file::{
-    ArcEnd, DrawError, Drawing, DrawnCorner, DrawnRegion, FileArc, FileNode, LayoutFile, LayoutFileError, Part,
-    PathPoint,
+    ArcEnd, FileArc, FileNode, LayoutFile, LayoutFileError, Part, PartialCorner, PartialEmbedding,
+    PartialEmbeddingError, PartialRegion, PathPoint,
 };
-pub use initial_embedding::{EmbedError, Embedding, embed};
-pub(crate) use patch::{Lookup, border_sides, flood};
+pub use initial_embedding::{Embedding, InitialEmbeddingError, embed};
+pub(crate) use patch::{ArcLookup, patch_faces, patch_sides};
 pub use patch::{PatchError, PatchMap, map_patches};
-pub(crate) use piece::Piece;
-pub use redraw::{RedrawError, Redrawn, redraw};
+pub(crate) use piece::Submesh;
+pub use redraw::{Reembedded, ReembeddingError, redraw};
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};

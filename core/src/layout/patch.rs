@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::disc;
 use super::initial_embedding::{Embedding, lengths};
-use super::piece::Piece;
+use super::piece::Submesh;
 use super::structure::QuadLayout;
 use crate::dual::{Mark, RefinedMesh};
 use crate::mesh::{HalfedgeId, TriMesh, TriMeshError, VertexId};
@@ -86,7 +86,7 @@ pub fn map_patches(
         *s = (s.0 + arc_length(a), s.1 + 1.0);
     }
     let chord_length: Vec<f64> = sum.iter().map(|(total, n)| total / n).collect();
-    let lookup = Lookup::new(embedding);
+    let lookup = ArcLookup::new(embedding);
     (0..layout.patches.len())
         .into_par_iter()
         .map(|p| {
@@ -99,13 +99,13 @@ pub fn map_patches(
 }
 
 /// Where arcs and nodes are.
-pub(crate) struct Lookup {
+pub(crate) struct ArcLookup {
     /// Arc of each directed edge on an arc, and whether it runs forward.
     arc: HashMap<(u32, u32), (u32, bool)>,
     is_node: Vec<bool>,
 }
 
-impl Lookup {
+impl ArcLookup {
     pub(crate) fn new(embedding: &Embedding) -> Self {
         let mut arc = HashMap::new();
         for (a, path) in embedding.arcs.iter().enumerate() {
@@ -125,15 +125,15 @@ impl Lookup {
 fn map_patch(
     layout: &QuadLayout,
     embedding: &Embedding,
-    lookup: &Lookup,
+    lookup: &ArcLookup,
     p: usize,
     size: DVec2,
 ) -> Result<PatchMap, PatchError> {
     let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
-    let faces = flood(&embedding.mesh, embedding.seeds[p], on_arc);
+    let faces = patch_faces(&embedding.mesh, embedding.seeds[p], on_arc);
     let piece =
-        Piece::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| PatchError::NoDisc { patch: p, source })?;
-    let sides = border_sides(layout, lookup, &piece, p).ok_or(PatchError::Sides { patch: p })?;
+        Submesh::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| PatchError::NoDisc { patch: p, source })?;
+    let sides = patch_sides(layout, lookup, &piece, p).ok_or(PatchError::Sides { patch: p })?;
 
     let mut refined = RefinedMesh::new(&piece.mesh);
     free_the_sides(&mut refined, &sides);
@@ -152,7 +152,7 @@ fn map_patch(
 }
 
 /// The faces reached from `seed` without passing an arc, in increasing order.
-pub(crate) fn flood(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
+pub(crate) fn patch_faces(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
     let mut seen = std::collections::HashSet::from([seed]);
     let mut faces = vec![seed];
     let mut i = 0;
@@ -171,7 +171,7 @@ pub(crate) fn flood(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool)
 }
 
 /// The vertices of the four sides, in the order of the layout's patch, each from corner to corner.
-pub(crate) fn border_sides(layout: &QuadLayout, lookup: &Lookup, piece: &Piece, p: usize) -> Option<[Vec<u32>; 4]> {
+pub(crate) fn patch_sides(layout: &QuadLayout, lookup: &ArcLookup, piece: &Submesh, p: usize) -> Option<[Vec<u32>; 4]> {
     let mesh = &piece.mesh;
     let start = mesh.halfedges().find(|&h| mesh.twin(h).is_none())?;
     let mut cycle = vec![start];

@@ -10,7 +10,7 @@ use crate::dual::RefinedMesh;
 use crate::mesh::{HalfedgeId, TriMesh, TriMeshError};
 
 /// A part of a mesh as a mesh of its own.
-pub(crate) struct Piece {
+pub(crate) struct Submesh {
     /// The part.
     pub mesh: TriMesh,
     /// Vertex of the whole that each vertex of the part is a copy of.
@@ -19,7 +19,7 @@ pub(crate) struct Piece {
     index: HashMap<u32, u32>,
 }
 
-impl Piece {
+impl Submesh {
     /// Cuts `faces` out of `whole` along the half-edges for which `cut` holds.
     pub(crate) fn cut_out(whole: &RefinedMesh, faces: &[u32], cut: impl Fn(u32) -> bool) -> Result<Self, TriMeshError> {
         let index: HashMap<u32, u32> = faces.iter().enumerate().map(|(k, &f)| (f, k as u32)).collect();

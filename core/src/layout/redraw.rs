@@ -6,18 +6,18 @@
 
 use thiserror::Error;
 
-use super::collapse::{CollapseError, Collapsed};
+use super::collapse::{CollapseError, CollapsedLayout};
 use super::dual::Dual;
-use super::initial_embedding::{EmbedError, Embedding, embed};
+use super::initial_embedding::{Embedding, InitialEmbeddingError, embed};
 use super::structure::{LayoutError, QuadLayout};
-use crate::dual::{ArrangementError, NoRoute};
+use crate::dual::{ArrangementError, NoPath};
 use crate::mesh::{TriMeshError, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::solve::SolveError;
 
 /// A layout and its drawing without some of the chords of another.
 #[derive(Debug, Clone)]
-pub struct Redrawn {
+pub struct Reembedded {
     /// What is left.
     pub layout: QuadLayout,
     /// Its drawing on the same surface.
@@ -32,7 +32,7 @@ pub struct Redrawn {
 
 /// Why a layout could not be drawn without some of its chords.
 #[derive(Debug, Error)]
-pub enum RedrawError {
+pub enum ReembeddingError {
     /// What would be left is no layout.
     #[error(transparent)]
     Collapse(#[from] CollapseError),
@@ -62,7 +62,7 @@ pub enum RedrawError {
         /// The patch.
         patch: usize,
         /// Where it failed.
-        source: NoRoute,
+        source: NoPath,
     },
     /// The dual curves are no arrangement.
     #[error(transparent)]
@@ -75,7 +75,7 @@ pub enum RedrawError {
     Other(#[from] LayoutError),
     /// The layout could not be drawn.
     #[error(transparent)]
-    Embed(#[from] EmbedError),
+    Embed(#[from] InitialEmbeddingError),
     /// Stopped from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -86,7 +86,7 @@ pub enum RedrawError {
 ///
 /// # Errors
 ///
-/// See [`RedrawError`].
+/// See [`ReembeddingError`].
 pub fn redraw(
     layout: &QuadLayout,
     drawing: &Embedding,
@@ -94,11 +94,11 @@ pub fn redraw(
     stays: impl Fn(usize) -> bool,
     n_surface: usize,
     progress: &Progress,
-) -> Result<Redrawn, RedrawError> {
+) -> Result<Reembedded, ReembeddingError> {
     let collapsed = layout.without(gone)?;
     let Dual { arrangement, base_face, drawing, middles } = Dual::new(layout, drawing, gone, n_surface, progress)?;
     let dual = QuadLayout::dual(&arrangement, &[], collapsed.layout.euler())?;
-    let region = |v: u32| arrangement.region_left_of(arrangement.refined.any_outgoing(v));
+    let region = |v: u32| arrangement.region_left_of(arrangement.refined.vertex_halfedge(v));
     let nodes: Vec<u32> = drawing.nodes.iter().map(|&v| region(v)).collect();
     let preferred = places(layout, &drawing, &dual, &nodes, stays);
     let segment = |v: u32| arrangement.refined.outgoing(v).into_iter().find_map(|h| arrangement.segment_at(h));
@@ -115,11 +115,11 @@ pub fn redraw(
             chords[layout.arcs[a].chord as usize] = Some(dual.arcs[target as usize].chord);
         }
     }
-    Ok(Redrawn { layout: dual, embedding, nodes, arcs, chords })
+    Ok(Reembedded { layout: dual, embedding, nodes, arcs, chords })
 }
 
 /// Checks that the layout dual to the drawn curves has the nodes that the deletion of chords has left.
-fn check(collapsed: &Collapsed, dual: &QuadLayout, nodes: &[u32]) -> Result<(), RedrawError> {
+fn check(collapsed: &CollapsedLayout, dual: &QuadLayout, nodes: &[u32]) -> Result<(), ReembeddingError> {
     for (n, &found) in nodes.iter().enumerate() {
         let (wanted, found) = (&collapsed.layout.nodes[collapsed.nodes[n] as usize], &dual.nodes[found as usize]);
         if wanted != found {

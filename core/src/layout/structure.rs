@@ -213,7 +213,7 @@ impl QuadLayout {
 
     /// The least numbers of quads across the chords with which a refinement is a mesh: no arc is cut short to join a node
     /// to itself, no two join the same nodes, and no patch has a node at two corners.
-    pub fn least_quads(&self) -> Vec<u32> {
+    pub fn min_quads_per_chord(&self) -> Vec<u32> {
         let mut least = vec![1; self.chords];
         let mut raise = |arc: u32, to: u32| {
             let least = &mut least[self.arcs[arc as usize].chord as usize];

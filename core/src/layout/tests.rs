@@ -158,7 +158,7 @@ fn merged_nodes_add_their_valences() {
 }
 
 /// Checks the drawing of what is left: patches are discs of four sides that cover the surface.
-fn checked(mesh: &TriMesh, redrawn: &Redrawn) {
+fn checked(mesh: &TriMesh, redrawn: &Reembedded) {
     redrawn.layout.check(mesh.euler_characteristic()).unwrap();
     let maps = map_patches(&redrawn.layout, &redrawn.embedding, &Progress::new()).unwrap();
     let area = |m: &TriMesh| m.faces().map(|f| m.face_area(f)).sum::<f64>();

@@ -23,7 +23,7 @@ pub struct LoadedMesh {
     /// The mesh, centred at the origin and of bounding-box diagonal 1.
     pub mesh: Arc<TriMesh>,
     /// The way back to the coordinates of the file.
-    pub units: Normalization,
+    pub units: Normalisation,
     /// What was changed to make it an oriented manifold, in the order done.
     pub repairs: Vec<Repair>,
     /// The file's name without folder and extension.
@@ -32,14 +32,14 @@ pub struct LoadedMesh {
 
 /// The similarity between file coordinates and the normalised frame.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Normalization {
+pub struct Normalisation {
     /// Centre of the bounding box, in file units.
     pub center: DVec3,
     /// Diagonal of the bounding box: file units per normalised unit.
     pub scale: f64,
 }
 
-impl Normalization {
+impl Normalisation {
     /// The frame in which `positions` have their bounding box centred and of diagonal 1; `None` where they have no
     /// extent that floating point can express.
     pub fn of(positions: &[DVec3]) -> Option<Self> {
@@ -222,7 +222,7 @@ pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<Loade
     let triangles = triangulate(&raw)?;
     let (positions, faces, repairs) = repair(raw, triangles)?;
     progress.report("Connecting triangles", 0.8);
-    let units = Normalization::of(&positions).ok_or(LoadError::NoSize)?;
+    let units = Normalisation::of(&positions).ok_or(LoadError::NoSize)?;
     let mesh = TriMesh::from_faces(positions.into_iter().map(|p| units.from_file(p)).collect(), &faces)?;
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     Ok(LoadedMesh { mesh: Arc::new(mesh), units, repairs, name: stem.to_owned() })
@@ -282,7 +282,7 @@ mod tests {
             } else {
                 assert!(matches!(loaded.repairs[0], Repair::SplitVertices { .. }), "{file}: {:?}", loaded.repairs);
             }
-            let again = Normalization::of(loaded.mesh.positions()).unwrap();
+            let again = Normalisation::of(loaded.mesh.positions()).unwrap();
             assert!((again.scale - 1.0).abs() < 1e-12 && again.center.length() < 1e-12);
         }
     }

@@ -14,7 +14,7 @@ use super::kernel::{EdgeId, TriMesh, TriMeshError, VertexId};
 /// # Errors
 ///
 /// More elements than ids can name.
-pub fn subdivided(mesh: &TriMesh, crease: &[bool]) -> Result<(TriMesh, Vec<bool>), TriMeshError> {
+pub fn loop_subdivision(mesh: &TriMesh, crease: &[bool]) -> Result<(TriMesh, Vec<bool>), TriMeshError> {
     let hard = |e: EdgeId| mesh.is_boundary_edge(e) || crease[e.index()];
     let old = mesh.vertices().map(|v| moved(mesh, v, &hard));
     let new = mesh.edges().map(|e| {
@@ -86,7 +86,7 @@ mod tests {
     fn topology_stays_and_triangles_become_four() {
         for name in ["pretzel", "sleeve"] {
             let mesh = builtin(name).unwrap().mesh;
-            let (fine, _) = subdivided(&mesh, &vec![false; mesh.n_edges()]).unwrap();
+            let (fine, _) = loop_subdivision(&mesh, &vec![false; mesh.n_edges()]).unwrap();
             let [before, after] = [&mesh, &fine].map(Topology::new);
             assert_eq!(fine.n_faces(), 4 * mesh.n_faces());
             assert_eq!((before.genus, before.boundary_loops.len()), (after.genus, after.boundary_loops.len()));
@@ -102,7 +102,7 @@ mod tests {
         let mut crease = sharp_edges(&mesh, SHARP_DIHEDRAL);
         assert_eq!(crease.iter().filter(|&&c| c).count(), 12);
         for k in 1..=2 {
-            (mesh, crease) = subdivided(&mesh, &crease).unwrap();
+            (mesh, crease) = loop_subdivision(&mesh, &crease).unwrap();
             assert_eq!(crease.iter().filter(|&&c| c).count(), 12 << k);
             assert_eq!(crease, sharp_edges(&mesh, SHARP_DIHEDRAL));
         }

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::kernel::TriMesh;
-use super::load::Normalization;
+use super::load::Normalisation;
 
 /// Writes polygons (vertex indices from 0) over `positions` (in file units) as OBJ.
 ///
@@ -33,7 +33,7 @@ pub fn write_obj<P: AsRef<[u32]>>(out: &mut impl Write, positions: &[DVec3], pol
 /// # Errors
 ///
 /// `out` cannot be written.
-pub fn write_mesh_obj(out: &mut impl Write, mesh: &TriMesh, units: &Normalization) -> io::Result<()> {
+pub fn write_mesh_obj(out: &mut impl Write, mesh: &TriMesh, units: &Normalisation) -> io::Result<()> {
     let positions: Vec<DVec3> = mesh.positions().iter().map(|&p| units.to_file(p)).collect();
     let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
     write_obj(out, &positions, &faces)

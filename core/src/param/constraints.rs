@@ -7,7 +7,7 @@
 
 use super::ParamError;
 use super::cut::Cut;
-use super::seamless::Relation;
+use super::seamless::CoordinateConstraint;
 use crate::field::Step;
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::solve::Constraint;
@@ -79,14 +79,18 @@ pub(super) fn add_translations(mesh: &TriMesh, cut: &Cut, values: &mut [f64]) {
 }
 
 /// The relations as constraints.
-pub(super) fn relations(mesh: &TriMesh, cut: &Cut, list: &[Relation]) -> Result<Vec<Constraint>, ParamError> {
+pub(super) fn relations(
+    mesh: &TriMesh,
+    cut: &Cut,
+    list: &[CoordinateConstraint],
+) -> Result<Vec<Constraint>, ParamError> {
     let one = |(i, r)| relation(mesh, cut, r).ok_or(ParamError::Malformed { relation: i });
     list.iter().enumerate().map(one).collect()
 }
 
 /// A relation as a constraint; `None` if it is malformed.
-fn relation(mesh: &TriMesh, cut: &Cut, relation: &Relation) -> Option<Constraint> {
-    let Relation { from, crossed, to, axis, difference } = relation;
+fn relation(mesh: &TriMesh, cut: &Cut, relation: &CoordinateConstraint) -> Option<Constraint> {
+    let CoordinateConstraint { from, crossed, to, axis, difference } = relation;
     let fine = |p: &SurfacePoint| p.face.index() < mesh.n_faces() && p.weights.iter().all(|w| w.is_finite());
     if *axis > 1 || !difference.is_finite() || !fine(from) || !fine(to) {
         return None;

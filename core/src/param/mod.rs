@@ -17,12 +17,12 @@ mod unfold;
 use thiserror::Error;
 
 pub use cut::{Cut, CutPath};
-pub(crate) use injective::Density;
-pub use injective::{Injective, InjectiveEnergy, NewtonSystem, Shape, folds, gradients};
+pub(crate) use injective::EnergyDensity;
+pub use injective::{DistortionWeights, InjectiveEnergy, InjectiveMap, NewtonSystem, folds, gradients};
 pub use objective::{Objective, Residual, residuals};
-pub use seamless::{Relation, SeamlessMap, Transition, turn};
+pub use seamless::{CoordinateConstraint, SeamlessMap, Transition, turn};
 pub use solve::{Coordinate, SeamlessSystem, Solution};
-pub use unfold::{Effort, Fold, FoldReason, OrientationProblem, OrientedTriangle, Unfolded, unfold};
+pub use unfold::{Effort, FlipReason, FlippedTriangle, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 
 use crate::mesh::EdgeId;
 use crate::progress::Cancelled;

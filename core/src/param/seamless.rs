@@ -54,7 +54,7 @@ pub fn turn(w: DVec2, quarters: i32) -> DVec2 {
 ///
 /// With `τ` the composition of the transitions across `crossed`: `[τ⁻¹(w_to) − w_from]_axis = difference`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Relation {
+pub struct CoordinateConstraint {
     /// The point the chain starts at; its triangle is the first of the chain.
     pub from: SurfacePoint,
     /// The half-edges crossed, each of the triangle that is left.

@@ -15,7 +15,7 @@ use super::constraints;
 use super::cut::Cut;
 use super::injective::NewtonSystem;
 use super::objective::{Local, Objective, residuals};
-use super::seamless::{Relation, SeamlessMap};
+use super::seamless::{CoordinateConstraint, SeamlessMap};
 use super::unfold::{Effort, OrientationProblem, OrientedTriangle, Unfolded, unfold};
 use super::{ParamError, expect_length};
 use crate::field::CrossField;
@@ -98,7 +98,7 @@ impl SeamlessSystem {
         mesh: &TriMesh,
         field: &CrossField,
         nodes: &[VertexId],
-        relations: &[Relation],
+        relations: &[CoordinateConstraint],
     ) -> Result<Self, ParamError> {
         expect_length("the list of period jumps", field.jump.len(), mesh.n_edges())?;
         let cut = Cut::new(mesh, field, nodes)?;
@@ -124,7 +124,7 @@ impl SeamlessSystem {
         mesh: &TriMesh,
         field: &CrossField,
         nodes: &[VertexId],
-        relations: &[Relation],
+        relations: &[CoordinateConstraint],
     ) -> Result<(), ParamError> {
         if mesh.n_faces() == self.cut.turn.len() && nodes == self.nodes && turns(field) == self.jump {
             return self.set_relations(mesh, relations);
@@ -140,7 +140,7 @@ impl SeamlessSystem {
     /// # Errors
     ///
     /// [`ParamError::Malformed`] or [`ParamError::Conflict`]; the system then stays as it was.
-    pub fn set_relations(&mut self, mesh: &TriMesh, relations: &[Relation]) -> Result<(), ParamError> {
+    pub fn set_relations(&mut self, mesh: &TriMesh, relations: &[CoordinateConstraint]) -> Result<(), ParamError> {
         let relations = constraints::relations(mesh, &self.cut, relations)?;
         if relations == self.relations {
             return Ok(());

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::*;
 use crate::field::samples::*;
-use crate::field::{CrossField, cross_field, indices, shape_field};
+use crate::field::{CrossField, cross_field, feature_aligned_field, indices};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::Metric;
@@ -56,7 +56,7 @@ fn check_seamless(mesh: &TriMesh, map: &SeamlessMap) {
 }
 
 /// How far a map is from a relation.
-fn miss(mesh: &TriMesh, map: &SeamlessMap, r: &Relation) -> f64 {
+fn miss(mesh: &TriMesh, map: &SeamlessMap, r: &CoordinateConstraint) -> f64 {
     let at = |p: &SurfacePoint| (0..3).map(|i| map.uv[p.face.index()][i] * p.weights[i]).sum::<DVec2>();
     let chain = r.crossed.iter().fold(Transition::IDENTITY, |t, &h| t.then(&map.transition(mesh, h).unwrap()));
     (chain.inverse().apply(at(&r.to)) - at(&r.from))[usize::from(r.axis)] - r.difference
@@ -89,7 +89,7 @@ fn chain(mesh: &TriMesh, from: FaceId, to: FaceId) -> Vec<HalfedgeId> {
 }
 
 /// Relations between triangles far apart, all with different weights, that `map` misses by 0.01 to 0.05.
-fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<Relation> {
+fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<CoordinateConstraint> {
     let far = mesh.n_faces() / 2;
     let one = |i: usize| {
         let [f, g] = [17 * i + 3, far + 29 * i].map(|k| FaceId::new(k % mesh.n_faces()));
@@ -97,7 +97,7 @@ fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<Relation> {
         let from = SurfacePoint { face: f, weights: [0.2, 0.3, 0.5] };
         let to =
             SurfacePoint { face: g, weights: if i.is_multiple_of(2) { [0.0, 1.0, 0.0] } else { [0.5, 0.25, 0.25] } };
-        let mut r = Relation { from, crossed, to, axis: (i % 2) as u8, difference: 0.0 };
+        let mut r = CoordinateConstraint { from, crossed, to, axis: (i % 2) as u8, difference: 0.0 };
         r.difference = miss(mesh, map, &r) + 0.01 * (1 + i % 5) as f64;
         r
     };
@@ -161,7 +161,8 @@ fn relations_hold_across_cuts_and_around_handles() {
         let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
         let plain = solved(&mut system, &metric, &field);
         let relations = relations(&mesh, &plain.map, 12);
-        let cuts = |r: &Relation| r.crossed.iter().filter(|&&h| system.cut().crossing(&mesh, h).is_some()).count();
+        let cuts =
+            |r: &CoordinateConstraint| r.crossed.iter().filter(|&&h| system.cut().crossing(&mesh, h).is_some()).count();
         assert!(relations.iter().map(cuts).max() > Some(1));
         system.set_relations(&mesh, &relations).unwrap();
         let bent = solved(&mut system, &metric, &field);
@@ -191,7 +192,8 @@ fn a_torus_takes_the_periods_asked_for() {
         })
         .collect();
     let point = SurfacePoint { face: FaceId(0), weights: [1.0, 0.0, 0.0] };
-    let around = |axis, difference| Relation { from: point, crossed: crossed.clone(), to: point, axis, difference };
+    let around =
+        |axis, difference| CoordinateConstraint { from: point, crossed: crossed.clone(), to: point, axis, difference };
     let list = [around(0, 3.0), around(1, 0.25)];
     let mut system = SeamlessSystem::new(&mesh, &field, &[], &list).unwrap();
     let map = solved(&mut system, &metric, &field).map;
@@ -213,21 +215,21 @@ fn contradictions_and_malformed_relations_are_named() {
     let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
     let map = solved(&mut system, &metric, &field).map;
     let good = relations(&mesh, &map, 6);
-    let with = |more: Relation| {
-        let all: Vec<Relation> = good.iter().cloned().chain([more]).collect();
+    let with = |more: CoordinateConstraint| {
+        let all: Vec<CoordinateConstraint> = good.iter().cloned().chain([more]).collect();
         SeamlessSystem::new(&mesh, &field, &list, &all).err()
     };
     assert_eq!(with(good[2].clone()), None);
-    let off = Relation { difference: good[2].difference + 0.1, ..good[2].clone() };
+    let off = CoordinateConstraint { difference: good[2].difference + 0.1, ..good[2].clone() };
     assert!(matches!(with(off), Some(ParamError::Conflict { relation: 2 | 6, .. })));
     // A point cannot be apart from itself; seen from another triangle of the chain it is the same point.
-    let apart = Relation { crossed: vec![], to: good[0].from, difference: 0.1, ..good[0].clone() };
+    let apart = CoordinateConstraint { crossed: vec![], to: good[0].from, difference: 0.1, ..good[0].clone() };
     assert!(matches!(with(apart), Some(ParamError::Conflict { relation: 6, .. })));
-    let broken = Relation { crossed: good[0].crossed[1..].to_vec(), ..good[0].clone() };
+    let broken = CoordinateConstraint { crossed: good[0].crossed[1..].to_vec(), ..good[0].clone() };
     assert_eq!(with(broken), Some(ParamError::Malformed { relation: 6 }));
-    let nan = Relation { difference: f64::NAN, ..good[0].clone() };
+    let nan = CoordinateConstraint { difference: f64::NAN, ..good[0].clone() };
     assert_eq!(with(nan), Some(ParamError::Malformed { relation: 6 }));
-    let other = shape_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+    let other = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
     let refused = system.solve(&metric, &other, &Objective::default(), &Progress::new());
     assert!(matches!(refused, Err(ParamError::OtherJump { .. })));
 }
@@ -249,7 +251,7 @@ fn misalignment(metric: &Metric, field: &CrossField, map: &SeamlessMap) -> f64 {
 fn anisotropy_makes_isolines_follow_the_field() {
     let mesh = octasphere(10);
     let metric = Metric::new(&mesh);
-    let field = shape_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+    let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
     let mut system = SeamlessSystem::new(&mesh, &field, &nodes(&field), &[]).unwrap();
     let [plain, strict] = [1.0, 10.0].map(|anisotropy| {
         let objective = Objective { anisotropy, ..Objective::default() };
@@ -263,7 +265,7 @@ fn anisotropy_makes_isolines_follow_the_field() {
 fn the_solution_is_the_minimum_of_the_energy() {
     let mesh = octasphere(5);
     let metric = Metric::new(&mesh);
-    let field = shape_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+    let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
     let list = nodes(&field);
     let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
     let relations = relations(&mesh, &solved(&mut system, &metric, &field).map, 4);

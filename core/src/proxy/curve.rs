@@ -34,7 +34,7 @@ const APART: f64 = 0.5;
 
 /// Why a curve cannot be carried to the other mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum CarryError {
+pub enum CurveTransferError {
     /// The curve is not one on the mesh it is carried from.
     #[error(transparent)]
     Curve(#[from] CurveError),
@@ -217,7 +217,11 @@ impl Proxy {
     /// # Errors
     ///
     /// A curve that is not one on the proxy, or an original too rough along it.
-    pub fn curve_to_original(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
+    pub fn curve_to_original(
+        &self,
+        original: &TriMesh,
+        curve: &SurfaceCurve,
+    ) -> Result<SurfaceCurve, CurveTransferError> {
         curve.check(self.mesh())?;
         let guide = Guide::new(self.mesh(), curve);
         self.along_on_original(original, &guide)
@@ -229,14 +233,14 @@ impl Proxy {
     /// # Errors
     ///
     /// An original too rough along it.
-    pub fn line_to_original(
+    pub fn polyline_to_original(
         &self,
         original: &TriMesh,
         line: &[(DVec3, FaceId)],
         closed: bool,
-    ) -> Result<SurfaceCurve, CarryError> {
+    ) -> Result<SurfaceCurve, CurveTransferError> {
         if line.len() < 2 {
-            return Err(CarryError::Lost);
+            return Err(CurveTransferError::Lost);
         }
         let guide = Guide::along(self.mesh(), line, closed);
         self.along_on_original(original, &guide).or_else(|lost| {
@@ -250,26 +254,26 @@ impl Proxy {
     /// # Errors
     ///
     /// A curve that is not one on the original, or one smaller than the triangles of the proxy.
-    pub fn curve_to_proxy(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
+    pub fn curve_to_proxy(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CurveTransferError> {
         curve.check(original)?;
         let points = (0..curve.crossings.len()).map(|i| curve.surface_point(original, i));
         let guide = Guide::image(self, original, points, curve.closed);
         self.along(&guide)
     }
 
-    /// As [`Self::curve_to_proxy`] for a line over the original, as in [`Self::line_to_original`].
+    /// As [`Self::curve_to_proxy`] for a line over the original, as in [`Self::polyline_to_original`].
     ///
     /// # Errors
     ///
     /// A line smaller than the triangles of the proxy.
-    pub fn line_to_proxy(
+    pub fn polyline_to_proxy(
         &self,
         original: &TriMesh,
         line: &[(DVec3, FaceId)],
         closed: bool,
-    ) -> Result<SurfaceCurve, CarryError> {
+    ) -> Result<SurfaceCurve, CurveTransferError> {
         if line.len() < 2 {
-            return Err(CarryError::Lost);
+            return Err(CurveTransferError::Lost);
         }
         let point = |&(p, face): &(DVec3, FaceId)| {
             let corners = original.face_vertices(face).map(|v| original.position(v));
@@ -282,12 +286,12 @@ impl Proxy {
         })
     }
 
-    fn along_on_original(&self, original: &TriMesh, guide: &Guide) -> Result<SurfaceCurve, CarryError> {
+    fn along_on_original(&self, original: &TriMesh, guide: &Guide) -> Result<SurfaceCurve, CurveTransferError> {
         let walker = Walker { mesh: original, places: self.places(), guide };
         walker.follow(self, |point| self.to_original(original, point).face)
     }
 
-    fn along(&self, guide: &Guide) -> Result<SurfaceCurve, CarryError> {
+    fn along(&self, guide: &Guide) -> Result<SurfaceCurve, CurveTransferError> {
         let walker = Walker { mesh: self.mesh(), places: self.mesh().positions(), guide };
         walker.follow(self, |point| point.face)
     }
@@ -303,11 +307,15 @@ struct Walker<'a> {
 
 impl Walker<'_> {
     /// The curve along the guide; `face_at` finds the face at a point of the proxy.
-    fn follow(&self, proxy: &Proxy, face_at: impl Fn(SurfacePoint) -> FaceId) -> Result<SurfaceCurve, CarryError> {
+    fn follow(
+        &self,
+        proxy: &Proxy,
+        face_at: impl Fn(SurfacePoint) -> FaceId,
+    ) -> Result<SurfaceCurve, CurveTransferError> {
         let (mesh, guide) = (self.mesh, self.guide);
         let n = guide.segments.len();
         let t = if guide.closed { 0.5 } else { 0.0 };
-        let mut error = CarryError::Lost;
+        let mut error = CurveTransferError::Lost;
         for i in 0..if guide.closed { STARTS.min(n) } else { 1 } {
             let k = i * n / STARTS.min(n);
             let s = &guide.segments[k];
@@ -359,7 +367,7 @@ impl Walker<'_> {
     }
 
     /// Walks from a half-edge, near a place on the guide, until the curve is closed or at the boundary.
-    fn walk(&self, (mut first, at): (HalfedgeId, f64)) -> Result<SurfaceCurve, CarryError> {
+    fn walk(&self, (mut first, at): (HalfedgeId, f64)) -> Result<SurfaceCurve, CurveTransferError> {
         let (mesh, guide) = (self.mesh, self.guide);
         let n = guide.segments.len() as f64;
         let mut ends = [mesh.origin(first), mesh.target(first)].map(|v| (v, self.side(v, at).distance));
@@ -406,11 +414,11 @@ impl Walker<'_> {
         let whole = if guide.closed { h == first } else { mesh.twin(h).is_none() };
         // A whole turn or way ends where it began up to the size of an edge; there is no half one.
         if !whole || gone < 0.5 * n || gone > 1.5 * n {
-            return Err(CarryError::Lost);
+            return Err(CurveTransferError::Lost);
         }
         let ratio = length / guide.length().max(f64::MIN_POSITIVE);
         if !(1.0 / LENGTH_FACTOR..LENGTH_FACTOR).contains(&ratio) {
-            return Err(CarryError::Length { ratio });
+            return Err(CurveTransferError::Length { ratio });
         }
         Ok(SurfaceCurve { crossings, closed: guide.closed })
     }

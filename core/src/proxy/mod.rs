@@ -23,7 +23,7 @@ use crate::mesh::{TriMesh, TriMeshError};
 use crate::progress::{Cancelled, Progress};
 use collapse::Simplifier;
 
-pub use curve::CarryError;
+pub use curve::CurveTransferError;
 pub use map::Proxy;
 
 /// Rounds of flips and shifts half way and at the end. Each gains less than the one before; after these the

@@ -1,17 +1,17 @@
 //! Quad meshes: refining a layout, smoothing on the surface, quality.
 
+mod adaptive_spacing;
 mod ground;
-mod near;
+mod local_repair;
 mod optimise;
 mod rail;
 mod refine;
 mod shape;
 mod smooth;
-mod stops;
-mod worst;
+mod spacing;
 
-pub use near::{farthest, near};
+pub use adaptive_spacing::{adaptive_spacing, resampling_error};
+pub use local_repair::{FeatureConstraint, repair_locally};
 pub use refine::{QuadMesh, refine};
-pub use smooth::{land, quality, scaled_jacobians, smooth};
-pub use stops::{Stops, whole_counts};
-pub use worst::{Held, mend};
+pub use smooth::{project, quality, scaled_jacobians, smooth};
+pub use spacing::{Spacing, integer_grid_counts};

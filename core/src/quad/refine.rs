@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::stops::Stops;
+use super::spacing::Spacing;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 
 /// A quad mesh that refines a layout.
@@ -28,7 +28,7 @@ pub struct QuadMesh {
 }
 
 /// Refines every patch to the grid of the lines along its two chords.
-pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], stops: &Stops) -> QuadMesh {
+pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], stops: &Spacing) -> QuadMesh {
     let position = |v: u32| embedding.mesh.positions[v as usize];
     let face_at = |v: u32| embedding.base_face[(embedding.mesh.outgoing(v)[0] / 3) as usize];
     let mut out = QuadMesh {
@@ -155,8 +155,12 @@ mod tests {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
         assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let mesh =
-            refine(&layout, &embedding, &maps, &Stops::on_surface(&layout, &maps, bend, whole / (target * target)));
+        let mesh = refine(
+            &layout,
+            &embedding,
+            &maps,
+            &Spacing::curvature_adapted(&layout, &maps, bend, whole / (target * target)),
+        );
         (layout, mesh)
     }
 

@@ -42,7 +42,7 @@ pub fn quality(mesh: &QuadMesh) -> (usize, f64) {
 
 /// Puts all vertices onto `base`, to the nearest place that is reached from where each is, boundary vertices along the
 /// boundary. A refinement of a mesh whose own vertices have moved on the surface lies next to it only.
-pub fn land(mesh: &mut QuadMesh, base: &TriMesh) {
+pub fn project(mesh: &mut QuadMesh, base: &TriMesh) {
     let ground = Ground::new(base);
     let rail = Rail::new(mesh, base);
     for v in 0..mesh.positions.len() {
@@ -184,7 +184,7 @@ mod tests {
             let mut mesh = grid(&base, size, closed);
             let before = mesh.positions.clone();
             mesh.positions.iter_mut().enumerate().for_each(|(v, p)| p.z += 1e-3 * (v % 3) as f64);
-            land(&mut mesh, &base);
+            project(&mut mesh, &base);
             let ground = Ground::new(&base);
             for ((&p, &f), old) in mesh.positions.iter().zip(&mesh.base_face).zip(&before) {
                 assert!(ground.follow(p, f).0.distance(p) < 1e-12 && p.distance(*old) < 3e-3);

@@ -4,7 +4,7 @@
 use super::StripError;
 use crate::field::{CrossField, EdgePath, Step};
 use crate::mesh::{HalfedgeId, TriMesh};
-use crate::param::{Objective, Relation, SeamlessMap, SeamlessSystem};
+use crate::param::{CoordinateConstraint, Objective, SeamlessMap, SeamlessSystem};
 use crate::progress::Progress;
 use crate::surface::Metric;
 use crate::surface::SurfacePoint;
@@ -46,7 +46,7 @@ pub(super) fn kept_coordinates(
     on_left.into_iter().chain(on_right)
 }
 
-fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath]) -> Vec<Relation> {
+fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath]) -> Vec<CoordinateConstraint> {
     let at = |h: HalfedgeId| {
         let mut weights = [0.0; 3];
         weights[h.index() % 3] = 1.0;
@@ -57,6 +57,12 @@ fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePa
     let steps = paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean));
     steps
         .filter_map(kept)
-        .map(|(h, axis)| Relation { from: at(h), crossed: Vec::new(), to: at(mesh.next(h)), axis, difference: 0.0 })
+        .map(|(h, axis)| CoordinateConstraint {
+            from: at(h),
+            crossed: Vec::new(),
+            to: at(mesh.next(h)),
+            axis,
+            difference: 0.0,
+        })
         .collect()
 }

@@ -3,12 +3,12 @@
 //! The room for turning curves along edges into strips. It may use `mesh`, `field`, `param` and `progress`;
 //! it does not know where the curves come from.
 
-mod conquer;
+mod coverage;
 mod map;
 #[cfg(test)]
 mod tests;
 
-use conquer::{Conquered, Ground};
+use coverage::{Conquered, Ground};
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
@@ -34,7 +34,7 @@ pub enum StripError {
 
 /// The strip around one curve.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Strip {
+pub struct StripCoverage {
     /// The curve that is its spine.
     pub curve: u32,
     /// How far it reaches to the left and to the right of its spine, in lengths on the mesh.
@@ -53,7 +53,7 @@ pub struct StripMap {
     /// Whether the map turns the triangle over or collapses it.
     pub flipped: Vec<bool>,
     /// One strip for each curve; for each piece if a curve has several.
-    pub strips: Vec<Strip>,
+    pub strips: Vec<StripCoverage>,
     /// The strip (position in [`Self::strips`]) whose isolines pass a triangle: those of constant u, of constant v.
     pub covered: Vec<[Option<u32>; 2]>,
     /// For the covering strip, the distance from its spine at each corner, positive on its left; continuous across
@@ -97,7 +97,7 @@ impl StripMap {
         let residual = residual(mesh, metric, &field, paths, &uv);
         let mean_edge = mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
         let ground = Ground { mesh, metric, field: &field, uv: &uv, flipped: &flipped, mean_edge };
-        let Conquered { strips, covered, stripe } = conquer::conquer(&ground, paths);
+        let Conquered { strips, covered, stripe } = coverage::conquer(&ground, paths);
         tracing::debug!(
             faces = mesh.n_faces(),
             strips = strips.len(),

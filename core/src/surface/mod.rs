@@ -8,7 +8,7 @@ mod path;
 mod point;
 mod relax;
 mod shape_operator;
-mod straightest;
+mod trace_geodesic;
 
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
@@ -20,5 +20,5 @@ pub use point::SurfacePoint;
 #[cfg(test)]
 pub(crate) use relax::testing;
 pub use relax::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
-pub use shape_operator::{face_curvature, second_form};
-pub use straightest::{PolarMap, Trace, straightest};
+pub use shape_operator::{face_curvature, second_fundamental_form};
+pub use trace_geodesic::{GeodesicTrace, PolarMap, trace_geodesic};

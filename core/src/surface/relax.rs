@@ -25,7 +25,7 @@ use crate::progress::{Cancelled, Progress};
 use super::{CurveError, SurfaceCurve, SurfacePoint};
 use energy::Energy;
 use original::{Best, Original};
-use strip::Strip;
+use strip::TriangleStrip;
 pub(super) use strip::{Side, spokes_across};
 
 /// Penalty of a direction: triangle and unit tangent in it → `q` of (8.1), not negative.
@@ -47,7 +47,7 @@ pub struct RelaxOptions<'a> {
     /// Crossings stay in `[t_min, 1 − t_min]` of their edges; between 0 and 0.5.
     pub t_min: f64,
     /// Points that the curve passes, up to a fraction of an edge; it passes smoothly, whatever vertices are near.
-    pub through: Vec<SurfacePoint>,
+    pub waypoints: Vec<SurfacePoint>,
     /// Number of times at most that the curve slides and then passes vertices.
     pub rounds: usize,
     /// Number of times that the vertices still pushed against are then tried one by one. 0 takes about half the
@@ -64,7 +64,7 @@ impl Default for RelaxOptions<'_> {
             fidelity: 1.0,
             tube: 2.5,
             t_min: 0.03,
-            through: Vec::new(),
+            waypoints: Vec::new(),
             rounds: 8,
             trials: 10,
         }
@@ -132,10 +132,10 @@ const PASSES: u8 = 2;
 /// A curve that is not one on `mesh`.
 pub fn curve_cost(mesh: &TriMesh, curve: &SurfaceCurve, options: &RelaxOptions<'_>) -> Result<CurveCost, CurveError> {
     curve.check(mesh)?;
-    Ok(strip_cost(mesh, options, &Strip::new(curve)))
+    Ok(strip_cost(mesh, options, &TriangleStrip::new(curve)))
 }
 
-fn strip_cost(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &Strip) -> CurveCost {
+fn strip_cost(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &TriangleStrip) -> CurveCost {
     let n = strip.len();
     let t: Vec<f64> = strip.nodes.iter().map(|n| n.t).collect();
     Energy::new(mesh, options, strip, vec![[0.0; 3]; n], vec![(0.0, 1.0); n]).cost(&t)
@@ -157,7 +157,7 @@ pub fn relax(
     if !(options.t_min > 0.0 && options.t_min < 0.5) {
         return Err(RelaxError::VertexDistance { t_min: options.t_min });
     }
-    let mut strip = Strip::new(curve);
+    let mut strip = TriangleStrip::new(curve);
     let before = strip_cost(mesh, options, &strip);
     let original = Original::new(mesh, &strip, options);
     for node in &mut strip.nodes {
@@ -199,7 +199,12 @@ pub fn relax(
 }
 
 /// The vertices that crossings push against, and the side they are on, the hardest pushed first.
-fn pushed_vertices(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &Strip, pushes: &[f64]) -> Vec<(VertexId, Side)> {
+fn pushed_vertices(
+    mesh: &TriMesh,
+    options: &RelaxOptions<'_>,
+    strip: &TriangleStrip,
+    pushes: &[f64],
+) -> Vec<(VertexId, Side)> {
     let mut pushed: Vec<(f64, VertexId, Side)> = Vec::new();
     for (i, &push) in pushes.iter().enumerate() {
         let t = strip.nodes[i].t;
@@ -219,7 +224,7 @@ fn pass_vertices(
     mesh: &TriMesh,
     options: &RelaxOptions<'_>,
     original: &Original,
-    strip: &mut Strip,
+    strip: &mut TriangleStrip,
     pushes: &[f64],
     passes: &mut HashMap<VertexId, u8>,
 ) -> usize {

@@ -25,7 +25,7 @@ pub fn face_curvature(
 }
 
 /// The second fundamental form `II(a, b)`, for vectors tangent to the surface.
-pub fn second_form(c: &PrincipalCurvature, a: DVec3, b: DVec3) -> f64 {
+pub fn second_fundamental_form(c: &PrincipalCurvature, a: DVec3, b: DVec3) -> f64 {
     c.k_min * a.dot(c.d_min) * b.dot(c.d_min) + c.k_max * a.dot(c.d_max) * b.dot(c.d_max)
 }
 
@@ -72,7 +72,7 @@ mod tests {
             assert!(c.d_min.dot(n).abs() < 1e-9 && c.d_max.dot(n).abs() < 1e-9 && c.d_min.is_normalized());
             assert!(c.d_min.dot(DVec3::Z.cross(p).normalize()).abs() > 0.98);
             let (a, b) = (c.d_min + c.d_max, c.d_min - c.d_max);
-            assert!((second_form(&c, a, b) - (c.k_min - c.k_max)).abs() < 1e-9);
+            assert!((second_fundamental_form(&c, a, b) - (c.k_min - c.k_max)).abs() < 1e-9);
         }
         let none = face_curvature(&mesh, &at, |_| false);
         assert!(none.iter().all(|c| c.k_min == 0.0 && c.k_max == 0.0));

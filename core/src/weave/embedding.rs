@@ -2,27 +2,27 @@
 
 use glam::DVec3;
 
-use crate::dual::{Arrangement, Colour, RegionReport, assess, untangle, vertex_curvatures};
-use crate::embed::{Embedded, EmbeddingError, Job, Next, Settings, Snapshot, headings};
+use crate::dual::{Arrangement, Colour, RegionReport, assess, remove_bigons, vertex_curvatures};
+use crate::embed::{EmbeddingError, Next, OptimisedEmbedding, Problem, Settings, Snapshot, arc_headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
 use crate::weave::design::Pin;
 use crate::weave::error::WeaveError;
-use crate::weave::mesh_role::{Ground, alike};
+use crate::weave::mesh_role::{MeshRole, alike};
 use crate::weave::model::{Model, features};
 use crate::weave::session::Session;
 
 /// A layout and a drawing of it.
 #[derive(Debug, Clone)]
-pub struct Drawn {
+pub struct InitialLayout {
     /// Its structure.
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
     /// The mesh that they are drawn on.
-    pub ground: Ground,
+    pub mesh_role: MeshRole,
 }
 
 /// Which nodes and arcs are pinned.
@@ -61,32 +61,35 @@ const EMBEDDED: usize = 150_000;
 /// # Errors
 ///
 /// [`crate::layout::LayoutError::RedRegions`] while there are red regions.
-pub fn draw(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
+pub fn initial_layout(session: &Session, progress: &Progress) -> Result<InitialLayout, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
     if model.proxy.is_some()
         && model.loaded.mesh.n_faces() <= EMBEDDED
         && woven.red().is_empty()
-        && let Some(drawn) = draw_on_design(session, progress)?
+        && let Some(drawn) = initial_layout_on_design(session, progress)?
     {
         return Ok(drawn);
     }
-    draw_as_woven(session, progress)
+    initial_layout_as_woven(session, progress)
 }
 
 /// The drawing on the mesh that is woven on.
-pub(in crate::weave) fn draw_as_woven(session: &Session, progress: &Progress) -> Result<Drawn, WeaveError> {
+pub(in crate::weave) fn initial_layout_as_woven(
+    session: &Session,
+    progress: &Progress,
+) -> Result<InitialLayout, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
     let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
     progress.report("Drawing nodes and arcs", 0.1);
     let (sharp, curved) = (&model.sharp, &model.vertex_curvatures);
     let preferred = preferred_nodes(&woven.arrangement, &layout, &woven.reports, &model.mesh, sharp, curved);
     let embedding = embed(&woven.arrangement, &layout, &preferred, progress)?;
-    let ground = if model.proxy.is_some() { Ground::Proxy } else { Ground::Design };
-    Ok(Drawn { layout, embedding, ground })
+    let mesh_role = if model.proxy.is_some() { MeshRole::Proxy } else { MeshRole::Design };
+    Ok(InitialLayout { layout, embedding, mesh_role })
 }
 
 /// The drawing on the mesh of the design; `None` where the strips, carried there, do not make the same layout.
-fn draw_on_design(session: &Session, progress: &Progress) -> Result<Option<Drawn>, WeaveError> {
+fn initial_layout_on_design(session: &Session, progress: &Progress) -> Result<Option<InitialLayout>, WeaveError> {
     let (model, mesh) = (session.model(), &session.model().loaded.mesh);
     progress.report("Arranging strips on the whole mesh", 0.02);
     let Some(arrangement) = arranged_on_design(session, progress)? else {
@@ -102,7 +105,7 @@ fn draw_on_design(session: &Session, progress: &Progress) -> Result<Option<Drawn
     let sharp = features(mesh, &model.options);
     let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &sharp, &curved);
     let embedding = embed(&arrangement, &layout, &preferred, progress)?;
-    Ok(Some(Drawn { layout, embedding, ground: Ground::Design }))
+    Ok(Some(InitialLayout { layout, embedding, mesh_role: MeshRole::Design }))
 }
 
 /// The arrangement on the mesh of the design that is like the one on the proxy, if there is one: of the strips as they were
@@ -110,7 +113,7 @@ fn draw_on_design(session: &Session, progress: &Progress) -> Result<Option<Drawn
 fn arranged_on_design(session: &Session, progress: &Progress) -> Result<Option<Arrangement>, WeaveError> {
     let (mesh, woven) = (&session.model().loaded.mesh, &session.woven().arrangement);
     let like = |mut curves: Vec<SurfaceCurve>| {
-        untangle(mesh, &mut curves);
+        remove_bigons(mesh, &mut curves);
         Arrangement::new(mesh, &curves).ok().filter(|a| alike(a, woven))
     };
     let placed: Vec<SurfaceCurve> = session.design().strips.iter().map(|s| s.curve.clone()).collect();
@@ -129,13 +132,13 @@ fn drawn_on_design(session: &Session, strip: usize) -> Option<SurfaceCurve> {
     let refined = &arrangement.refined;
     let face = |h: u32| FaceId(refined.base_face(h / 3));
     let at = |v: u32| refined.positions[v as usize];
-    let course = arrangement.course(strip as u32);
-    let mut line: Vec<(DVec3, FaceId)> = course.iter().map(|&h| (at(refined.origin(h)), face(h))).collect();
-    let (closed, &last) = (session.design().strips[strip].curve.closed, course.last()?);
+    let curve_halfedges = arrangement.curve_halfedges(strip as u32);
+    let mut line: Vec<(DVec3, FaceId)> = curve_halfedges.iter().map(|&h| (at(refined.origin(h)), face(h))).collect();
+    let (closed, &last) = (session.design().strips[strip].curve.closed, curve_halfedges.last()?);
     if !closed {
         line.push((at(refined.target(last)), face(last)));
     }
-    model.proxy.as_ref()?.line_to_original(&model.loaded.mesh, &line, closed).ok()
+    model.proxy.as_ref()?.polyline_to_original(&model.loaded.mesh, &line, closed).ok()
 }
 
 /// The pronounced corners of the shape by vertices of the design's mesh.
@@ -183,7 +186,7 @@ fn feature_corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<bool> {
     degree.into_iter().map(|d| d > 2).collect()
 }
 
-impl Drawn {
+impl InitialLayout {
     /// The pin that stands for a node; this must be the first drawing.
     pub fn node_pin(&self, node: usize) -> Option<Pin> {
         self.embedding.nodes.get(node).map(|&v| Pin::Node(self.position(v).to_array()))
@@ -237,19 +240,19 @@ impl Drawn {
 /// See [`EmbeddingError`].
 pub fn optimise(
     session: &Session,
-    drawn: &Drawn,
+    drawn: &InitialLayout,
     pinned: &PinnedParts,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
-) -> Result<Embedded, EmbeddingError> {
+) -> Result<OptimisedEmbedding, EmbeddingError> {
     let model = session.model();
-    let surface = model.surface(drawn.ground);
-    let headings = headings(&drawn.layout);
-    let job = Job {
+    let surface = model.surface(drawn.mesh_role);
+    let arc_headings = arc_headings(&drawn.layout);
+    let job = Problem {
         surface,
         layout: &drawn.layout,
-        drawing: &drawn.embedding,
-        headings: &headings,
+        initial_embedding: &drawn.embedding,
+        arc_headings: &arc_headings,
         pinned_nodes: &pinned.nodes,
         pinned_arcs: &pinned.arcs,
         settings: Settings::default(),

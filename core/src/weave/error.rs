@@ -6,10 +6,10 @@ use crate::dual::ArrangementError;
 use crate::elastica::ElasticaError;
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
-use crate::layout::{DrawError, EmbedError, LayoutError, LayoutFileError, Part, PatchError};
+use crate::layout::{InitialEmbeddingError, LayoutError, LayoutFileError, Part, PartialEmbeddingError, PatchError};
 use crate::mesh::LoadError;
 use crate::progress::Cancelled;
-use crate::proxy::CarryError;
+use crate::proxy::CurveTransferError;
 use crate::weave::design::{DesignError, StripId};
 
 /// Whatever can go wrong while weaving.
@@ -35,13 +35,13 @@ pub enum WeaveError {
     Design(#[from] DesignError),
     /// A strip woven on a proxy has no counterpart on the mesh itself.
     #[error("the strip cannot be placed here: {0}")]
-    Carry(#[from] CarryError),
+    Carry(#[from] CurveTransferError),
     /// There is no valid layout yet.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// The layout could not be embedded.
     #[error(transparent)]
-    Embed(#[from] EmbedError),
+    Embed(#[from] InitialEmbeddingError),
     /// The embedding could not be optimised.
     #[error(transparent)]
     Embedding(#[from] EmbeddingError),
@@ -53,7 +53,7 @@ pub enum WeaveError {
     LayoutFile(#[from] LayoutFileError),
     /// The layout of a file cannot be drawn on its mesh.
     #[error(transparent)]
-    Draw(#[from] DrawError),
+    Draw(#[from] PartialEmbeddingError),
     /// A layout that lacks arcs is completed by the optimisation only.
     #[error("the layout lacks arcs; they only emerge when its embedding is optimised")]
     Incomplete,
@@ -62,7 +62,7 @@ pub enum WeaveError {
     NoPart(Part),
     /// No strip can be suggested.
     #[error(transparent)]
-    Stuck(#[from] Stuck),
+    NoSuggestion(#[from] NoSuggestion),
     /// The strips do not fit the mesh that other options would weave on.
     #[error(
         "the strips placed make another layout on the surface with this detail; remove those on small relief first"
@@ -83,7 +83,7 @@ pub enum WeaveError {
 
 /// No strip can be suggested.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum Stuck {
+pub enum NoSuggestion {
     /// Nothing is left to do.
     #[error("nothing is left to do")]
     Done,

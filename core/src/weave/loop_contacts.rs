@@ -14,7 +14,7 @@ use crate::surface::{Crossing, SurfaceCurve};
 type Chord = [f64; 2];
 
 /// Placed strips and features of a mesh.
-pub(in crate::weave) struct Company<'a> {
+pub(in crate::weave) struct LoopContacts<'a> {
     mesh: &'a TriMesh,
     sharp: &'a [bool],
     /// For each triangle the chords of placed strips in it, with the numbers of these.
@@ -24,12 +24,12 @@ pub(in crate::weave) struct Company<'a> {
 
 /// How often a curve crosses each placed strip, and features.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::weave) struct Met {
+pub(in crate::weave) struct ContactCounts {
     strips: Vec<u32>,
     features: u32,
 }
 
-impl<'a> Company<'a> {
+impl<'a> LoopContacts<'a> {
     pub(in crate::weave) fn new<'s>(
         mesh: &'a TriMesh,
         sharp: &'a [bool],
@@ -46,7 +46,7 @@ impl<'a> Company<'a> {
     }
 
     /// What a curve meets.
-    pub(in crate::weave) fn met(&self, curve: &SurfaceCurve) -> Met {
+    pub(in crate::weave) fn met(&self, curve: &SurfaceCurve) -> ContactCounts {
         let mut strips = vec![0; self.n_strips];
         for (face, chord) in chords(self.mesh, curve) {
             for &(i, other) in self.chords.get(&face).into_iter().flatten() {
@@ -54,11 +54,11 @@ impl<'a> Company<'a> {
             }
         }
         let sharp = |c: &&Crossing| self.sharp[self.mesh.edge(c.halfedge).index()];
-        Met { strips, features: curve.crossings.iter().filter(sharp).count() as u32 }
+        ContactCounts { strips, features: curve.crossings.iter().filter(sharp).count() as u32 }
     }
 }
 
-impl Met {
+impl ContactCounts {
     /// Whether nothing is crossed more often than before.
     pub(in crate::weave) fn no_more_than(&self, before: &Self) -> bool {
         self.features <= before.features && self.strips.iter().zip(&before.strips).all(|(now, then)| now <= then)
@@ -100,8 +100,8 @@ mod tests {
         let mesh = cylinder(24, 12, 0.0);
         let none = vec![false; mesh.n_edges()];
         let (low, high, up) = (ring(&mesh, 24, 3, 0.0), ring(&mesh, 24, 5, 0.0), upright(&mesh, 24, 12, 7));
-        let company = Company::new(&mesh, &none, [&low, &up]);
-        assert_eq!(company.met(&high), Met { strips: vec![0, 1], features: 0 });
+        let company = LoopContacts::new(&mesh, &none, [&low, &up]);
+        assert_eq!(company.met(&high), ContactCounts { strips: vec![0, 1], features: 0 });
         // Shaken, a ring crosses the one it was to and fro, always as often there as back.
         let shaken = company.met(&ring(&mesh, 24, 3, 0.3));
         assert!(shaken.strips[0] > 0 && shaken.strips[0].is_multiple_of(2), "{shaken:?}");
@@ -118,7 +118,7 @@ mod tests {
             (p.z - q.z).abs() < 1e-9
         };
         let sharp: Vec<bool> = mesh.edges().map(|e| level(mesh.halfedge(e)) && !mesh.is_boundary_edge(e)).collect();
-        let company = Company::new(&mesh, &sharp, []);
+        let company = LoopContacts::new(&mesh, &sharp, []);
         assert_eq!(company.met(&upright(&mesh, 24, 12, 7)).features, 11);
         assert_eq!(company.met(&ring(&mesh, 24, 5, 0.0)).features, 0);
     }

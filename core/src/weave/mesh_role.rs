@@ -8,13 +8,13 @@ use glam::DVec3;
 
 use crate::dual::{Arrangement, Region, Side, SideKind};
 use crate::embed::Surface;
-use crate::proxy::CarryError;
+use crate::proxy::CurveTransferError;
 use crate::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint, principal_curvature};
 use crate::weave::model::Model;
 
 /// The mesh that a layout is drawn and embedded on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ground {
+pub enum MeshRole {
     /// That of the design.
     Design,
     /// The proxy that stands for it.
@@ -24,15 +24,15 @@ pub enum Ground {
 impl Model {
     /// One of the two meshes with what the embedding needs of it; of a mesh with a proxy this is made when it is first
     /// asked for.
-    pub fn surface(&self, ground: Ground) -> Surface<'_> {
+    pub fn surface(&self, mesh_role: MeshRole) -> Surface<'_> {
         let (mesh, curvature, sharp) = (&*self.mesh, &self.curvature[..], &self.sharp[..]);
-        match (ground, &self.proxy) {
+        match (mesh_role, &self.proxy) {
             (_, None) => Surface { mesh, index: &self.index, curvature, sharp },
-            (Ground::Proxy, Some(_)) => {
+            (MeshRole::Proxy, Some(_)) => {
                 let index = self.own.proxy_index.get_or_init(|| SurfaceIndex::new(mesh));
                 Surface { mesh, index, curvature, sharp }
             }
-            (Ground::Design, Some(_)) => {
+            (MeshRole::Design, Some(_)) => {
                 let (mesh, sharp) = (&*self.loaded.mesh, &self.own.sharp[..]);
                 let radius = self.options.curvature_radius;
                 let curvature = self.own.curvature.get_or_init(|| principal_curvature(mesh, radius, sharp));
@@ -50,8 +50,8 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// See [`CarryError`].
-    pub fn to_design(&self, curve: &SurfaceCurve) -> Result<SurfaceCurve, CarryError> {
+    /// See [`CurveTransferError`].
+    pub fn to_design(&self, curve: &SurfaceCurve) -> Result<SurfaceCurve, CurveTransferError> {
         match &self.proxy {
             Some(proxy) => proxy.curve_to_original(&self.loaded.mesh, curve),
             None => Ok(curve.clone()),
@@ -59,7 +59,7 @@ impl Model {
     }
 
     /// A curve on the mesh that is woven on as points in space on the design's mesh.
-    pub fn shown(&self, curve: &SurfaceCurve) -> Vec<DVec3> {
+    pub fn on_design_mesh(&self, curve: &SurfaceCurve) -> Vec<DVec3> {
         let Some(proxy) = &self.proxy else { return curve.points(&self.mesh) };
         let original = &self.loaded.mesh;
         match proxy.curve_to_original(original, curve) {

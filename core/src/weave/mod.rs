@@ -21,17 +21,19 @@ mod tests;
 mod woven;
 
 pub use design::{Design, DesignError, Pin, Strip, StripId};
-pub use embedding::{Drawn, PinnedParts, draw, optimise};
-pub use error::{Stuck, WeaveError};
-pub use export::files::{Export, ExportOptions, QuadSize, Shortest, Sketch, Watch, export, finish, write_all};
+pub use embedding::{InitialLayout, PinnedParts, initial_layout, optimise};
+pub use error::{NoSuggestion, WeaveError};
+pub use export::files::{
+    CollapseLength, EmbeddingInput, Export, ExportOptions, QuadSize, Watch, export, finish, write_all,
+};
 pub use export::report::{Before, Times};
-pub use mesh_role::Ground;
+pub use mesh_role::MeshRole;
 pub use model::{Model, Options};
 pub use opened_layout::OpenedLayout;
 pub use proposal::{ElasticEnergy, Proposal};
 pub use script::{Script, ScriptError, Step, replay};
 pub use search::fit::Fit;
-pub use search::improve::{Improvement, ROUNDS};
+pub use search::improve::{IMPROVEMENT_ROUNDS, Improvement};
 pub use search::suggest::Goal;
 pub use session::Session;
 pub use woven::Woven;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dual::vertex_curvatures;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
-use crate::field::{Guides, pronounced, shape_field};
+use crate::field::{AlignmentDirections, feature_aligned_field, pronounced};
 use crate::mesh::{
     LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
 };
@@ -215,8 +215,8 @@ fn shape_corners(
         directions.push(strongest.0);
         weights.push((strongest.1 / FULL_ANISOTROPY).min(1.0));
     }
-    let guides = Guides { directions: &directions, weights: &weights, radius: GUIDE_RADIUS };
-    match shape_field(mesh, &metric, Some(guides), sharp, progress) {
+    let guides = AlignmentDirections { directions: &directions, weights: &weights, radius: GUIDE_RADIUS };
+    match feature_aligned_field(mesh, &metric, Some(guides), sharp, progress) {
         Ok(field) => {
             Ok(pronounced(mesh, &field.singularities, CORNER_RADIUS).into_iter().map(|s| (s.vertex, s.index)).collect())
         }

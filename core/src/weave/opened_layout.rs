@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::embed::{Headings, Surface};
+use crate::embed::{ArcHeadings, Surface};
 use crate::layout::LayoutFile;
 use crate::mesh::{LoadedMesh, MeshSource, Topology};
 use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
-use crate::weave::embedding::{Drawn, PinnedParts};
+use crate::weave::embedding::{InitialLayout, PinnedParts};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::{Export, ExportOptions, Sketch, Watch, finish, make_folder};
+use crate::weave::export::files::{EmbeddingInput, Export, ExportOptions, Watch, finish, make_folder};
 use crate::weave::export::report::{Subject, Times, write_report};
-use crate::weave::mesh_role::Ground;
+use crate::weave::mesh_role::MeshRole;
 use crate::weave::model::{Options, features};
 
 /// A layout from a file with its mesh. The layout may lack arcs.
@@ -23,8 +23,8 @@ pub struct OpenedLayout {
     index: SurfaceIndex,
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
-    drawn: Drawn,
-    headings: Vec<Headings>,
+    drawn: InitialLayout,
+    arc_headings: Vec<ArcHeadings>,
     pinned: PinnedParts,
 }
 
@@ -44,9 +44,9 @@ impl OpenedLayout {
             let full = folder.join(&*mesh);
             *mesh = full.canonicalize().unwrap_or(full);
         }
-        let drawing = file.draw(&loaded.mesh)?;
+        let initial_embedding = file.draw(&loaded.mesh)?;
         progress.check()?;
-        let (layout, embedding) = drawing.to_embedding()?;
+        let (layout, embedding) = initial_embedding.to_embedding()?;
         let mut pinned = PinnedParts {
             nodes: file.nodes.iter().map(|n| n.fixed).collect(),
             arcs: file.arcs.iter().map(|a| a.fixed).collect(),
@@ -59,9 +59,9 @@ impl OpenedLayout {
         progress.report("Measuring curvature", 0.1);
         let curvature = principal_curvature(&loaded.mesh, options.curvature_radius, &sharp);
         progress.check()?;
-        let (topology, headings) = (Topology::new(&loaded.mesh), drawing.arc_headings());
-        let drawn = Drawn { layout, embedding, ground: Ground::Design };
-        Ok(Self { file, loaded, topology, index, curvature, sharp, drawn, headings, pinned })
+        let (topology, arc_headings) = (Topology::new(&loaded.mesh), initial_embedding.arc_headings());
+        let drawn = InitialLayout { layout, embedding, mesh_role: MeshRole::Design };
+        Ok(Self { file, loaded, topology, index, curvature, sharp, drawn, arc_headings, pinned })
     }
 
     /// The mesh.
@@ -97,12 +97,12 @@ impl OpenedLayout {
     ) -> Result<Result<Export, WeaveError>, WeaveError> {
         make_folder(folder)?;
         let mesh = &*self.loaded.mesh;
-        let sketch = Sketch {
+        let sketch = EmbeddingInput {
             surface: Surface { mesh, index: &self.index, curvature: &self.curvature, sharp: &self.sharp },
             proxy: None,
             units: self.loaded.units,
             drawn: &self.drawn,
-            headings: &self.headings,
+            arc_headings: &self.arc_headings,
             pinned: &self.pinned,
         };
         let result = finish(&sketch, None, options, progress, watch);
@@ -111,7 +111,7 @@ impl OpenedLayout {
         if let Ok(export) = &result {
             export.write(folder, &self.loaded.units)?;
             if export.has_collapsed() {
-                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.before.drawing)?;
+                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.before.initial_embedding)?;
             }
         }
         file.write(&folder.join("layout.layout"))?;

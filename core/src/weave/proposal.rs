@@ -8,7 +8,7 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
 use crate::weave::error::WeaveError;
-use crate::weave::loop_contacts::Company;
+use crate::weave::loop_contacts::LoopContacts;
 
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,16 +56,16 @@ const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
 /// A found loop, relaxed to a smooth curve that still passes `at` and crosses neither features nor placed strips more
 /// often than it did.
-pub(in crate::weave) fn polished(
+pub(in crate::weave) fn smoothed_proposal(
     graph: &ElasticaGraph,
-    company: &Company<'_>,
+    company: &LoopContacts<'_>,
     found: &FoundLoop,
     at: SurfacePoint,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
     let before = company.met(&found.curve);
     for tube in TUBES {
-        let options = RelaxOptions { through: vec![at], tube, ..Default::default() };
+        let options = RelaxOptions { waypoints: vec![at], tube, ..Default::default() };
         match relax(graph.mesh(), &found.curve, &options, progress) {
             Ok(relaxed) if company.met(&relaxed.curve).no_more_than(&before) => {
                 return Ok(Proposal::found(found).relaxed(relaxed));

@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::mesh::{LoadError, MeshSource};
 use crate::progress::Progress;
 use crate::weave::design::{Design, DesignError};
-use crate::weave::error::Stuck;
+use crate::weave::error::NoSuggestion;
 use crate::weave::error::WeaveError;
 use crate::weave::model::Options;
 use crate::weave::proposal::Proposal;
@@ -201,7 +201,7 @@ impl Shown {
                     Ok(proposal) => {
                         session.place(proposal, progress)?;
                     }
-                    Err(WeaveError::Stuck(Stuck::Done)) => {}
+                    Err(WeaveError::NoSuggestion(NoSuggestion::Done)) => {}
                     Err(error) => return Err(error.into()),
                 }
                 *self = Self::default();

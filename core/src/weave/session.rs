@@ -9,10 +9,10 @@ use crate::progress::Progress;
 use crate::surface::{SurfaceCurve, SurfacePoint};
 use crate::weave::design::{Design, Pin, Strip, StripId};
 use crate::weave::error::WeaveError;
-use crate::weave::loop_contacts::Company;
+use crate::weave::loop_contacts::LoopContacts;
 use crate::weave::mesh_role::alike;
 use crate::weave::model::{Model, Options};
-use crate::weave::proposal::{Proposal, polished};
+use crate::weave::proposal::{Proposal, smoothed_proposal};
 use crate::weave::recent::RecentSearches;
 use crate::weave::woven::Woven;
 use rayon::prelude::*;
@@ -146,13 +146,13 @@ impl Session {
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
         let placed = self.design.strips.iter().map(Strip::woven);
-        let company = Company::new(&self.model.mesh, &self.model.sharp, placed);
-        let polished = |l: &FoundLoop| polished(graph, &company, l, at, progress);
+        let company = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
+        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &company, l, at, progress);
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
             Certainty::Found => first(Proposal::found(l)),
             Certainty::Proved => {
-                let smooth = polished(l);
+                let smooth = smoothed_proposal(l);
                 if let Ok(smooth) = &smooth {
                     first(smooth.clone());
                 }
@@ -163,7 +163,7 @@ impl Session {
         // What was handed out already is not smoothed again.
         let (known, smooth) = best.map_or((None, None), |(curve, smooth)| (Some(curve), Some(smooth)));
         let done = found.first().is_some_and(|l| known.as_ref() == Some(&l.curve));
-        let rest: Vec<_> = found.par_iter().skip(usize::from(done)).map(polished).collect();
+        let rest: Vec<_> = found.par_iter().skip(usize::from(done)).map(smoothed_proposal).collect();
         smooth.filter(|_| done).into_iter().chain(rest).collect()
     }
 
@@ -295,7 +295,7 @@ impl Session {
     /// What the surface would look like with `proposal` added; for suggestions.
     pub(in crate::weave) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
         let placed = self.design.strips.iter().map(Strip::woven);
-        Arrangement::sketch(&self.model.mesh, placed.chain([curve]))
+        Arrangement::unsubdivided(&self.model.mesh, placed.chain([curve]))
     }
 }
 
@@ -322,7 +322,7 @@ fn on_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError
             }
         }
     }
-    let here = Arrangement::sketch(&model.mesh, design.strips.iter().map(Strip::woven))?;
-    let there = Arrangement::sketch(original, design.strips.iter().map(|s| &s.curve))?;
+    let here = Arrangement::unsubdivided(&model.mesh, design.strips.iter().map(Strip::woven))?;
+    let there = Arrangement::unsubdivided(original, design.strips.iter().map(|s| &s.curve))?;
     Ok(alike(&here, &there))
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use crate::dual::{Arrangement, ArrangementError, Colour, Mark, RegionReport, assess};
-use crate::elastica::{DirectionMask, LoopClasses};
+use crate::elastica::{DirectionMask, HomologyClasses};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::strip::StripMap;
@@ -28,7 +28,7 @@ pub struct Woven {
     /// Of these only the directions along the strips' spines.
     pub spine_mask: DirectionMask,
     /// Which loops are one another shifted, past no corner of the shape and no crossing of strips.
-    pub classes: LoopClasses,
+    pub classes: HomologyClasses,
     /// The refined mesh of the arrangement as a mesh of its own.
     pub mesh: TriMesh,
     /// The map of all strips on that mesh; `None` without strips, or where it cannot be computed.
@@ -77,14 +77,14 @@ impl Woven {
 
 /// A strip on the other side of a corner separates other corners; on the other side of a crossing it crosses the strips in
 /// another order.
-fn classes(model: &Model, arrangement: &Arrangement) -> LoopClasses {
+fn classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses {
     let mesh = &*model.mesh;
     let corners = model.corners.iter().map(|c| c.0);
     let crossings = arrangement.crossings.iter().map(|c| {
         let face = FaceId(arrangement.refined.base_face(c.spokes[0] / 3));
         mesh.face_vertices(face)[0]
     });
-    LoopClasses::new(mesh, corners.chain(crossings))
+    HomologyClasses::new(mesh, corners.chain(crossings))
 }
 
 /// Closes the directions along a strip's spine in the triangles it passes.

@@ -69,7 +69,7 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
     let progress = Progress::new();
     let mut work = SearchWorkspace::new();
     let start = Instant::now();
-    model.graph.prepare(&progress)?;
+    model.graph.prepare_boundary_costs(&progress)?;
     if !model.topology.boundary_loops.is_empty() {
         report.add_times(group, "ways to the boundary, once", &[start.elapsed()]);
     }
@@ -157,7 +157,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
             let now = Instant::now();
             let (mut first, mut best) = (None, None);
             let proposals = session.proposals_with(at, &progress, |proposal| {
-                drop(model.shown(&proposal.curve));
+                drop(model.on_design_mesh(&proposal.curve));
                 best = Some(now.elapsed());
                 first = first.or(best);
             })?;

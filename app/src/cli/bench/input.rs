@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use plait_core::mesh::{
-    LoadedMesh, MeshSource, SHARP_DIHEDRAL, load, parse_with, sharp_edges, subdivided, write_mesh_obj,
+    LoadedMesh, MeshSource, SHARP_DIHEDRAL, load, loop_subdivision, parse_with, sharp_edges, write_mesh_obj,
 };
 use plait_core::progress::Progress;
 
@@ -27,7 +27,7 @@ impl Input {
         }
         let mut crease = sharp_edges(&loaded.mesh, SHARP_DIHEDRAL);
         for _ in 0..levels {
-            let (mesh, finer) = subdivided(&loaded.mesh, &crease)?;
+            let (mesh, finer) = loop_subdivision(&loaded.mesh, &crease)?;
             (loaded.mesh, crease) = (mesh.into(), finer);
         }
         let mut obj = Vec::new();

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use plait_core::mesh::{FaceId, TriMesh};
 use plait_core::surface::Metric;
-use plait_core::surface::{SurfacePoint, straightest};
+use plait_core::surface::{SurfacePoint, trace_geodesic};
 
 /// A sequence of random points.
 #[derive(Debug)]
@@ -48,7 +48,7 @@ impl Points {
     pub(super) fn stroke(&mut self, mesh: &TriMesh, metric: &Metric, count: usize, step: f64) -> Vec<SurfacePoint> {
         let start = self.point().nearest_vertex(mesh);
         let angle = self.unit() * TAU;
-        (1..=count).map(|i| straightest(mesh, metric, start, angle, i as f64 * step).end).collect()
+        (1..=count).map(|i| trace_geodesic(mesh, metric, start, angle, i as f64 * step).end).collect()
     }
 }
 

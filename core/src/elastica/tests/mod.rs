@@ -1,6 +1,6 @@
 //! The search against plain Dijkstra, and the curves it returns, on generated and on real meshes.
 
-mod anchors;
+mod anchored_loops;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -319,7 +319,7 @@ fn of_loops_shifted_over_the_surface_one_is_proposed() {
     let mut fewer = 0;
     // The corners of an octahedron, and besides a handle, which needs no mark.
     for (g, marks) in [(round, 0..0), (long, 0..6)] {
-        let classes = LoopClasses::new(g.mesh(), marks.map(VertexId));
+        let classes = HomologyClasses::new(g.mesh(), marks.map(VertexId));
         let mut work = SearchWorkspace::new();
         for v in sample(&g, 6) {
             let query = ProposalQuery { factor: 3.0, ..ProposalQuery::alternatives(v, &mask) };

@@ -9,12 +9,12 @@ use glam::DVec2;
 
 use crate::embed::EmbeddingError;
 use crate::embed::optimise::isoline_crossing::crossing;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::optimise::regular_nodes::outward;
-use crate::embed::optimise::relocation::{Hold, edge_path};
+use crate::embed::optimise::relocation::{NodeConstraint, edge_path};
 use crate::embed::parameterise::feature_axes;
 use crate::embed::parameterise::state::State;
-use crate::embed::topology::embedding_topology::Net;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::progress::Progress;
 
@@ -67,7 +67,7 @@ struct Place {
     strip: Vec<FaceId>,
 }
 
-impl Optimizer<'_> {
+impl Optimiser<'_> {
     /// Brings nodes onto the features from which what lies between is squeezed away; returns how many.
     ///
     /// # Errors
@@ -145,7 +145,7 @@ impl Optimizer<'_> {
         let mut count = 0;
         for (i, place) in places.iter().enumerate() {
             if place.as_ref().is_some_and(|p| state.net.nodes[i].vertex == p.vertex) {
-                self.ground.hold[i] = Hold::Curve;
+                self.ground.hold[i] = NodeConstraint::Curve;
                 count += 1;
             }
         }
@@ -155,7 +155,7 @@ impl Optimizer<'_> {
     }
 
     /// The net with nodes at their places but for those that stay.
-    fn brought(&self, places: &[Option<Place>], stays: &[bool]) -> Net {
+    fn brought(&self, places: &[Option<Place>], stays: &[bool]) -> EmbeddingTopology {
         let mut net = self.state.net.clone();
         for (i, place) in places.iter().enumerate() {
             let Some(Place { vertex, strip }) = place.as_ref().filter(|_| !stays[i]) else { continue };
@@ -166,7 +166,7 @@ impl Optimizer<'_> {
             }
             if let Some(path) = edge_path(&net.mesh, strip, from, *vertex, |v| taken.contains(&v)) {
                 net.mesh.set_position(from, self.ground.home[from.index()]);
-                path.into_iter().for_each(|h| net.move_along(i, h));
+                path.into_iter().for_each(|h| net.move_node(i, h));
             }
         }
         net
@@ -181,14 +181,14 @@ impl Optimizer<'_> {
     ) -> Option<Place> {
         let State { net, solution, .. } = &self.state;
         let (mesh, map) = (&net.mesh, &solution.map);
-        if self.ground.hold[i] != Hold::Free {
+        if self.ground.hold[i] != NodeConstraint::Free {
             return None;
         }
-        let corners: Vec<(HalfedgeId, DVec2)> = if self.roads.held[i] {
+        let corners: Vec<(HalfedgeId, DVec2)> = if self.through_arcs.constrained[i] {
             let own = |h: HalfedgeId| (h, map.uv[h.index() / 3][h.index() % 3]);
             mesh.outgoing(net.nodes[i].vertex).map(own).collect()
         } else {
-            crossing(net, &self.roads, map, &self.ends[i]).into_iter().collect()
+            crossing(net, &self.through_arcs, map, &self.ends[i]).into_iter().collect()
         };
         let first = corners.into_iter().map(|(h, at)| (mesh.face(h), at));
         let (vertex, strip) = outward(net, map, first, |f, at| {
@@ -204,7 +204,7 @@ impl Optimizer<'_> {
         let foot = Foot::new(&self.state, h, at);
         // Of a node that is held the coordinates are its own, and what counts is how far it is on the surface.
         let far = mesh.position(self.state.net.nodes[i].vertex).distance(mesh.position(mesh.origin(h)));
-        let near = if self.roads.held[i] { SQUEEZED * far / mesh.vector(h).length() } else { NEAR };
+        let near = if self.through_arcs.constrained[i] { SQUEEZED * far / mesh.vector(h).length() } else { NEAR };
         (foot.is_inside() && foot.far < near * foot.length).then(|| foot.end(&self.state))
     }
 

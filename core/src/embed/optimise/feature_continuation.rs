@@ -7,7 +7,7 @@
 //! relations moves nothing.
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::constraints::{self, WHOLE};
 use crate::embed::parameterise::feature_axes;
 use crate::embed::parameterise::solve::{Features, Folded};
@@ -32,7 +32,7 @@ const BROKEN: f64 = 0.2;
 /// How often features are let go where the map would fold even so, each time a ring of triangles farther around.
 const LOOSENINGS: usize = 6;
 
-impl Optimizer<'_> {
+impl Optimiser<'_> {
     /// Makes features isolines that were pulled towards them, where the layout allows it.
     ///
     /// # Errors
@@ -141,8 +141,9 @@ impl Optimizer<'_> {
         let pulled = self.pulled();
         let (Some(system), Some(shape)) = (&mut self.seamless, self.shape) else { return Ok(()) };
         let newton = system.newton()?;
-        let State { metric, field, objective, firmness, solution, .. } = &self.state;
-        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(&pulled);
+        let State { metric, field, objective, anisotropy_share, solution, .. } = &self.state;
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, anisotropy_share))
+            .with_isoline_penalties(&pulled);
         let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
         system.descend(&newton, &energy, &mut at, STEPS, progress)?;
         self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };

@@ -1,11 +1,11 @@
 //! The end of an optimisation: all nodes on their isolines, and no folds.
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::{HOPELESS, Optimizer};
+use crate::embed::optimise::optimiser::{HOPELESS, Optimiser};
 use crate::embed::parameterise::state::State;
-use crate::field::GuidedSystem;
+use crate::field::GuidingFieldSystem;
 use crate::mesh::TriMesh;
-use crate::param::{Effort, Fold};
+use crate::param::{Effort, FlippedTriangle};
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
@@ -22,25 +22,25 @@ const SETTLING: usize = 3;
 /// By what share the energy changes when they have come there.
 const SETTLED: f64 = 3e-3;
 
-impl Optimizer<'_> {
+impl Optimiser<'_> {
     /// Ends the optimisation: brings regular nodes onto their isolines and holds them there, and removes folds. Returned
     /// are the folds that remain.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub fn finish(&mut self, progress: &Progress) -> Result<Vec<Fold>, EmbeddingError> {
+    pub fn finish(&mut self, progress: &Progress) -> Result<Vec<FlippedTriangle>, EmbeddingError> {
         if self.shape.is_some() {
             self.finish_without_folds(progress)?;
             return Ok(Vec::new());
         }
         self.settle(progress)?;
         self.refine(progress)?;
-        self.roads.hold_all();
+        self.through_arcs.constrain_all();
         loop {
             self.solve_loosening(progress)?;
             let State { net, solution, .. } = &self.state;
-            if self.spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least) == 0 {
+            if self.spacing.extend(net, &self.through_arcs, &self.chord_of, &solution.map, self.least) == 0 {
                 break;
             }
         }
@@ -69,7 +69,7 @@ impl Optimizer<'_> {
     fn finish_without_folds(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         self.hold_features(progress)?;
         self.settle_exactly(progress)?;
-        self.roads.hold_all();
+        self.through_arcs.constrain_all();
         self.solve_loosening(progress)?;
         if let Some(edge) = self.settings.integer {
             self.round(edge, progress)?;
@@ -101,10 +101,10 @@ impl Optimizer<'_> {
     /// Makes the triangles around irregular nodes finer.
     fn refine(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let State { net, field, .. } = &self.state;
-        let Some((net, carried)) = net.finer_at_nodes(&field.angle, &self.sharp, &self.curvature)? else {
+        let Some((net, carried)) = net.refine_at_irregular_nodes(&field.angle, &self.sharp, &self.curvature)? else {
             return Ok(());
         };
-        self.guided = GuidedSystem::new(&net.mesh)?;
+        self.guided = GuidingFieldSystem::new(&net.mesh)?;
         (self.seamless, self.sizes) = (None, None);
         (self.sharp, self.curvature) = (carried.sharp, carried.at_vertex);
         self.state.field.angle = net.angle.clone();

@@ -8,15 +8,15 @@ use glam::{DVec2, DVec3};
 
 use crate::dual::{Mark, RefinedMesh};
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::{Known, Optimizer};
+use crate::embed::optimise::optimiser::{Known, Optimiser};
 use crate::embed::parameterise::solve::{Aim, Features, Folded, Start};
 use crate::embed::parameterise::state::State;
-use crate::embed::problem::{Job, Surface};
-use crate::embed::topology::embedding_topology::Net;
-use crate::field::is_creased;
+use crate::embed::problem::{Problem, Surface};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::field::is_feature_dominated;
 use crate::layout::{Embedding, PatchMap, QuadLayout, map_patches};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::param::Shape;
+use crate::param::DistortionWeights;
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
@@ -36,11 +36,11 @@ impl Drawn {
     /// Maps the patches of a drawing and puts them together again.
     pub(in crate::embed) fn new(
         layout: &QuadLayout,
-        drawing: &Embedding,
+        initial_embedding: &Embedding,
         progress: &Progress,
     ) -> Result<Self, EmbeddingError> {
-        let maps = map_patches(layout, drawing, progress)?;
-        let mut positions: Vec<DVec3> = drawing.mesh.positions.clone();
+        let maps = map_patches(layout, initial_embedding, progress)?;
+        let mut positions: Vec<DVec3> = initial_embedding.mesh.positions.clone();
         let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
         let mut seeds = Vec::with_capacity(maps.len());
         for PatchMap { mesh, whole, base_face: base, uv: at, .. } in &maps {
@@ -57,7 +57,7 @@ impl Drawn {
         }
         let mesh = TriMesh::from_faces(positions, &faces)?;
         let mut refined = RefinedMesh::new(&mesh);
-        for (a, path) in drawing.arcs.iter().enumerate() {
+        for (a, path) in initial_embedding.arcs.iter().enumerate() {
             for w in path.windows(2) {
                 let h = refined.find(w[0], w[1]).ok_or(EmbeddingError::Arc { arc: a })?;
                 refined.set_mark(h, Mark::Arc(a as u32));
@@ -65,9 +65,9 @@ impl Drawn {
         }
         let embedding = Embedding {
             base_face: (0..mesh.n_faces() as u32).collect(),
-            nodes: drawing.nodes.clone(),
-            arcs: drawing.arcs.clone(),
-            arc_parameters: drawing.arc_parameters.clone(),
+            nodes: initial_embedding.nodes.clone(),
+            arcs: initial_embedding.arcs.clone(),
+            arc_parameters: initial_embedding.arc_parameters.clone(),
             seeds,
             mesh: refined,
         };
@@ -84,23 +84,23 @@ const SIZE_CREASED: f64 = 0.06;
 /// Steps of Newton's method for a first map: it has long converged by then.
 const STEPS: usize = 60;
 
-impl<'a> Optimizer<'a> {
+impl<'a> Optimiser<'a> {
     /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
     pub(in crate::embed) fn from_drawing(
-        job: &Job<'a>,
+        job: &Problem<'a>,
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let drawn = Drawn::new(job.layout, job.drawing, progress)?;
-        let mut net = Net::new(&drawn.mesh, &drawn.embedding, job.layout, job.headings)?;
+        let drawn = Drawn::new(job.layout, job.initial_embedding, progress)?;
+        let mut net = EmbeddingTopology::new(&drawn.mesh, &drawn.embedding, job.layout, job.arc_headings)?;
         for f in &mut net.base_face {
             *f = FaceId(drawn.base_face[f.index()]);
         }
         let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
+        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
         Self::on(job, (net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
     }
 
@@ -110,9 +110,9 @@ impl<'a> Optimizer<'a> {
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub(in crate::embed) fn finer_net(job: &Job<'_>) -> Result<Known, EmbeddingError> {
+    pub(in crate::embed) fn finer_net(job: &Problem<'_>) -> Result<Known, EmbeddingError> {
         let (net, sharp, curvature) = Self::net(job)?;
-        Ok(match net.finer_at_nodes(&net.angle, &sharp, &curvature)? {
+        Ok(match net.refine_at_irregular_nodes(&net.angle, &sharp, &curvature)? {
             Some((net, carried)) => (net, carried.sharp, carried.at_vertex),
             None => (net, sharp, curvature),
         })
@@ -126,12 +126,12 @@ impl<'a> Optimizer<'a> {
     ///
     /// See [`EmbeddingError`].
     pub(in crate::embed) fn from_guess(
-        job: &Job<'a>,
+        job: &Problem<'a>,
         known: Known,
         (uv, steps, pull): (&[[DVec2; 3]], usize, f64),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let aim = Aim::Injective { shape: shape(job), start: Start::Turned(uv), steps };
+        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Turned(uv), steps };
         Self::on(job, known, (aim, Features::Pulled(pull)), progress)
     }
 
@@ -141,18 +141,18 @@ impl<'a> Optimizer<'a> {
     ///
     /// See [`EmbeddingError`].
     pub(in crate::embed) fn from_map(
-        job: &Job<'a>,
+        job: &Problem<'a>,
         (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let aim = Aim::Injective { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
+        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
         Self::on(job, (state.net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
     }
 }
 
-fn shape(job: &Job<'_>) -> Shape {
-    let size = if is_creased(job.surface.mesh, job.surface.sharp) { SIZE_CREASED } else { SIZE };
-    Shape { anisotropy: job.settings.anisotropy, size }
+fn shape(job: &Problem<'_>) -> DistortionWeights {
+    let size = if is_feature_dominated(job.surface.mesh, job.surface.sharp) { SIZE_CREASED } else { SIZE };
+    DistortionWeights { anisotropy: job.settings.anisotropy, size }
 }
 
 impl Drawn {

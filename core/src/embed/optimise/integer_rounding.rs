@@ -7,14 +7,14 @@
 //! there, the map is solved for again, and so on. Nodes have come to rest before, and move again afterwards.
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::chord_lengths::{Held, lengths};
 use crate::progress::Progress;
 
 /// Share of the chords left that is rounded before the map is solved for anew: at first those that hardly change.
 const SHARE: f64 = 0.25;
 
-impl Optimizer<'_> {
+impl Optimiser<'_> {
     /// Holds every chord at a whole multiple of `edge` that the map tells the length of, and lets the nodes step anew.
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl Optimizer<'_> {
     /// The chords that are not rounded yet with what they would be held at, those first that are nearest to it.
     fn open_chords(&self, edge: f64) -> Vec<(f64, usize, Held)> {
         let (net, map) = (&self.state.net, &self.state.solution.map);
-        let found = lengths(net, &self.roads, &self.chord_of, map, self.spacing.held.len());
+        let found = lengths(net, &self.through_arcs, &self.chord_of, map, self.spacing.held.len());
         let mut open: Vec<(f64, usize, Held)> = Vec::new();
         for (chord, (found, held)) in found.into_iter().zip(&self.spacing.held).enumerate() {
             if held.is_some_and(|h| h.whole) {

@@ -7,8 +7,8 @@
 use glam::DVec2;
 
 use crate::embed::parameterise::chord_lengths::transition;
-use crate::embed::topology::embedding_topology::{Net, jump_across};
-use crate::embed::topology::through_arcs::{Crossroads, around};
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, jump_across};
+use crate::embed::topology::through_arcs::{ThroughArcs, around};
 use crate::mesh::HalfedgeId;
 use crate::param::SeamlessMap;
 use crate::surface::Metric;
@@ -16,13 +16,13 @@ use crate::surface::Metric;
 /// The step, as a vector in the plane of the layout of the triangle of the half-edge returned, that brings a regular
 /// node to the crossing of its isolines; `None` where the map does not tell.
 pub(in crate::embed) fn step_to_crossing(
-    net: &Net,
-    roads: &Crossroads,
+    net: &EmbeddingTopology,
+    through_arcs: &ThroughArcs,
     metric: &Metric,
     map: &SeamlessMap,
     ends: &[(u32, bool)],
 ) -> Option<(HalfedgeId, DVec2)> {
-    let (corner, crossing) = crossing(net, roads, map, ends)?;
+    let (corner, crossing) = crossing(net, through_arcs, map, ends)?;
     let off = crossing - at(map, corner);
     let [u, v] = map.gradients(metric, net.mesh.face(corner));
     let area = u.perp_dot(v);
@@ -34,18 +34,18 @@ pub(in crate::embed) fn step_to_crossing(
 /// The crossing of the isolines of a regular node, in the coordinates of the triangle of the half-edge returned, a corner
 /// at the node; `None` where the map does not tell.
 pub(in crate::embed) fn crossing(
-    net: &Net,
-    roads: &Crossroads,
+    net: &EmbeddingTopology,
+    through_arcs: &ThroughArcs,
     map: &SeamlessMap,
     ends: &[(u32, bool)],
 ) -> Option<(HalfedgeId, DVec2)> {
     let mesh = &net.mesh;
-    let corner = roads.corner(net, *ends.first()?);
+    let corner = through_arcs.corner(net, *ends.first()?);
     // For each coordinate what a held node says, the one by the shortest chain, and the sum of what others say.
     let mut held: [Option<(usize, f64)>; 2] = [None; 2];
     let mut others = [(0.0, 1.0); 2];
     for &end in ends {
-        for (chain, node) in roads.ways(net, end) {
+        for (chain, node) in through_arcs.continuations(net, end) {
             let mut crossed = around(mesh, corner, chain.start)?;
             let turns: i32 = crossed.iter().map(|&h| jump_across(mesh, &net.jump, h)).sum();
             let heading = (i32::from(chain.heading) + turns).rem_euclid(4);
@@ -53,7 +53,7 @@ pub(in crate::embed) fn crossing(
             let there = transition(mesh, map, &crossed)?.inverse().apply(at(map, chain.end));
             let axis = if heading % 2 == 0 { 1 } else { 0 };
             let off = (there - at(map, corner))[axis];
-            if !roads.held[node] {
+            if !through_arcs.constrained[node] {
                 others[axis] = (others[axis].0 + off, others[axis].1 + 1.0);
             } else if held[axis].is_none_or(|(n, _)| crossed.len() < n) {
                 held[axis] = Some((crossed.len(), off));

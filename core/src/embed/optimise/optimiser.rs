@@ -7,18 +7,18 @@
 use glam::{DVec2, DVec3};
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::relocation::{Ground, Hold};
+use crate::embed::optimise::relocation::{NodeConstraint, SurfaceProjection};
 use crate::embed::optimise::setup::{ground, mean_edge, sharp_edges};
 use crate::embed::parameterise::chord_lengths::{Spacing, lengths};
 use crate::embed::parameterise::solve::{Aim, Features, Folded, Solver, Start};
 use crate::embed::parameterise::state::State;
-use crate::embed::problem::{Job, Settings};
-use crate::embed::topology::corner_nodes::snap;
-use crate::embed::topology::embedding_topology::Net;
-use crate::embed::topology::through_arcs::{ArcEnd, Crossroads};
-use crate::field::GuidedSystem;
+use crate::embed::problem::{Problem, Settings};
+use crate::embed::topology::corner_nodes::move_nodes_to_corners;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs};
+use crate::field::GuidingFieldSystem;
 use crate::mesh::{FaceId, VertexId};
-use crate::param::{SeamlessSystem, Shape, gradients};
+use crate::param::{DistortionWeights, SeamlessSystem, gradients};
 use crate::progress::Progress;
 use crate::solve::SpdSymbolic;
 use crate::surface::Metric;
@@ -45,27 +45,27 @@ const NEWTON_STEPS: usize = 4;
 const TURNED_RINGS: usize = 2;
 
 /// A net with what is known of its mesh: sharp edges, and curvature at the vertices.
-pub(in crate::embed) type Known = (Net, Vec<bool>, Vec<PrincipalCurvature>);
+pub(in crate::embed) type Known = (EmbeddingTopology, Vec<bool>, Vec<PrincipalCurvature>);
 
 /// An embedding under optimisation.
-pub struct Optimizer<'a> {
-    pub(in crate::embed) ground: Ground<'a>,
+pub struct Optimiser<'a> {
+    pub(in crate::embed) ground: SurfaceProjection<'a>,
     pub(in crate::embed) settings: Settings,
     pub(in crate::embed) curvature: Vec<PrincipalCurvature>,
     pub(in crate::embed) sharp: Vec<bool>,
-    pub(in crate::embed) roads: Crossroads,
+    pub(in crate::embed) through_arcs: ThroughArcs,
     /// Chords held at lengths, the chord of every arc, the least length and the fewest quads across every chord.
     pub(in crate::embed) spacing: Spacing,
     pub(in crate::embed) chord_of: Vec<u32>,
     pub(in crate::embed) least: f64,
     pub(in crate::embed) fewest: Vec<u32>,
     /// The ends of arcs at each node.
-    pub(in crate::embed) ends: Vec<Vec<ArcEnd>>,
-    pub(in crate::embed) guided: GuidedSystem,
+    pub(in crate::embed) ends: Vec<Vec<HalfArc>>,
+    pub(in crate::embed) guided: GuidingFieldSystem,
     pub(in crate::embed) seamless: Option<SeamlessSystem>,
     pub(in crate::embed) sizes: Option<SpdSymbolic>,
     /// What maps are to be like that must not fold; `None` for those of least squares.
-    pub(in crate::embed) shape: Option<Shape>,
+    pub(in crate::embed) shape: Option<DistortionWeights>,
     /// What is done about features.
     pub(in crate::embed) features: Features,
     /// Edges of features that are only pulled even where others are held; empty: none.
@@ -82,25 +82,25 @@ pub struct Optimizer<'a> {
     steps: usize,
 }
 
-impl<'a> Optimizer<'a> {
+impl<'a> Optimiser<'a> {
     /// Sets up the optimisation of a drawn layout and solves for its first field and map.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub fn new(job: &Job<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
+    pub fn new(job: &Problem<'a>, progress: &Progress) -> Result<Self, EmbeddingError> {
         let ready = Self::net(job)?;
         progress.check()?;
         Self::on(job, ready, (Aim::LeastSquares, Features::Held), progress)?.map_err(|_| EmbeddingError::Folded)
     }
 
     /// The net of a drawn layout with what is known of its mesh: sharp edges, and curvature at the vertices.
-    pub(in crate::embed) fn net(job: &Job<'_>) -> Result<Known, EmbeddingError> {
-        let Job { surface, layout, .. } = *job;
-        let mut net = Net::new(surface.mesh, job.drawing, layout, job.headings)?;
+    pub(in crate::embed) fn net(job: &Problem<'_>) -> Result<Known, EmbeddingError> {
+        let Problem { surface, layout, .. } = *job;
+        let mut net = EmbeddingTopology::new(surface.mesh, job.initial_embedding, layout, job.arc_headings)?;
         let sharp = sharp_edges(&surface, &net);
         let held = pinned(job);
-        snap(&mut net, &sharp, |i| held[i]);
+        move_nodes_to_corners(&mut net, &sharp, |i| held[i]);
         let nearest = |v: usize| {
             if v < surface.mesh.n_vertices() {
                 return surface.curvature[v];
@@ -114,18 +114,18 @@ impl<'a> Optimizer<'a> {
 
     /// Sets up the optimisation on a net with what is known of its mesh: sharp edges, and curvature at the vertices.
     pub(in crate::embed) fn on(
-        job: &Job<'a>,
+        job: &Problem<'a>,
         (net, sharp, curvature): Known,
         (aim, features): (Aim<'_>, Features),
         progress: &Progress,
     ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let Job { surface, layout, settings, .. } = *job;
+        let Problem { surface, layout, settings, .. } = *job;
         let held = pinned(job);
-        let mut roads = Crossroads::new(layout, |i| held[i]);
+        let mut through_arcs = ThroughArcs::new(layout, |i| held[i]);
         let shape = match aim {
             Aim::LeastSquares => None,
-            Aim::Injective { shape, .. } => {
-                roads.hold_all();
+            Aim::InjectiveMap { shape, .. } => {
+                through_arcs.constrain_all();
                 Some(shape)
             }
         };
@@ -137,12 +137,12 @@ impl<'a> Optimizer<'a> {
         let ground = ground(&surface, &net, &sharp, |i| held[i], settings);
         let spacing = Spacing::none(layout.chords);
         let least = settings.spacing * mean_edge(surface.mesh);
-        let guided = GuidedSystem::new(&net.mesh)?;
+        let guided = GuidingFieldSystem::new(&net.mesh)?;
         let metric = Metric::new(&net.mesh);
         let mut solver = Solver {
             curvature: &curvature,
             sharp: &sharp,
-            roads: &roads,
+            through_arcs: &through_arcs,
             spacing: &spacing,
             guided: &guided,
             seamless: None,
@@ -161,11 +161,11 @@ impl<'a> Optimizer<'a> {
             settings,
             curvature,
             sharp,
-            roads,
+            through_arcs,
             spacing,
             chord_of: layout.arcs.iter().map(|a| a.chord).collect(),
             least,
-            fewest: layout.least_quads(),
+            fewest: layout.min_quads_per_chord(),
             ends,
             guided,
             seamless,
@@ -183,9 +183,9 @@ impl<'a> Optimizer<'a> {
     }
 
     /// Lets regular nodes go where the isolines through them cross; see [`Self::finish`].
-    pub(in crate::embed) fn release(&mut self, job: &Job<'_>) {
+    pub(in crate::embed) fn release(&mut self, job: &Problem<'_>) {
         let held = pinned(job);
-        self.roads = Crossroads::new(job.layout, |i| held[i]);
+        self.through_arcs = ThroughArcs::new(job.layout, |i| held[i]);
     }
 
     /// Whether least squares lead nowhere: after some steps many triangles are still folded.
@@ -217,14 +217,14 @@ impl<'a> Optimizer<'a> {
 
     /// Begins anew where it once was, with all nodes held on their isolines.
     pub(in crate::embed) fn begin_held(&mut self, state: State) {
-        self.roads.hold_all();
+        self.through_arcs.constrain_all();
         if self.shape.is_some() {
             self.release_features();
         }
         for (hold, node) in self.ground.hold.iter_mut().zip(&state.net.nodes) {
             // Nodes that have since been brought onto features are where they were.
-            if *hold == Hold::Curve && !self.ground.on_curve[node.vertex.index()] {
-                *hold = Hold::Free;
+            if *hold == NodeConstraint::Curve && !self.ground.on_curve[node.vertex.index()] {
+                *hold = NodeConstraint::Free;
             }
         }
         self.state = state;
@@ -233,13 +233,13 @@ impl<'a> Optimizer<'a> {
 
     /// For each node whether it stays where it is.
     pub fn stays(&self) -> Vec<bool> {
-        self.ground.hold.iter().map(|&hold| hold == Hold::Fixed).collect()
+        self.ground.hold.iter().map(|&hold| hold == NodeConstraint::Fixed).collect()
     }
 
     /// The chords that are shorter than `least`, or would be shorter than triangles resolve, with their lengths.
     pub fn short_chords(&self, least: f64) -> Vec<(u32, f64)> {
         let (net, map) = (&self.state.net, &self.state.solution.map);
-        let found = lengths(net, &self.roads, &self.chord_of, map, self.spacing.held.len());
+        let found = lengths(net, &self.through_arcs, &self.chord_of, map, self.spacing.held.len());
         let short = |chord: u32, length: f64| self.spacing.held[chord as usize].is_some() || length < least;
         (0..).zip(found).filter_map(|(c, l)| Some((c, l?.1))).filter(|&(c, l)| short(c, l)).collect()
     }
@@ -255,7 +255,7 @@ impl<'a> Optimizer<'a> {
         let State { net, solution, .. } = &self.state;
         // A map without folds keeps chords from vanishing by itself.
         let extend =
-            |spacing: &mut Spacing| spacing.extend(net, &self.roads, &self.chord_of, &solution.map, self.least);
+            |spacing: &mut Spacing| spacing.extend(net, &self.through_arcs, &self.chord_of, &solution.map, self.least);
         let held = if self.shape.is_none() { extend(&mut self.spacing) } else { 0 };
         if held > 0 {
             tracing::debug!(held, "chords held apart");
@@ -315,7 +315,7 @@ impl<'a> Optimizer<'a> {
     /// is asked for with the cells and for each node whether it stays. `None` if too few can move.
     pub(in crate::embed) fn as_far_as_possible(
         &mut self,
-        moved: impl Fn(&Self, &[u32], &[bool]) -> Net,
+        moved: impl Fn(&Self, &[u32], &[bool]) -> EmbeddingTopology,
         mut stays: Vec<bool>,
         progress: &Progress,
     ) -> Result<(Option<State>, Vec<bool>), EmbeddingError> {
@@ -359,14 +359,18 @@ impl<'a> Optimizer<'a> {
     /// # Errors
     ///
     /// See [`EmbeddingError`]; [`EmbeddingError::Folded`] if there is to be a map without folds and none was found.
-    pub(in crate::embed) fn solve(&mut self, net: Net, progress: &Progress) -> Result<State, EmbeddingError> {
+    pub(in crate::embed) fn solve(
+        &mut self,
+        net: EmbeddingTopology,
+        progress: &Progress,
+    ) -> Result<State, EmbeddingError> {
         self.attempt(net, progress)?.map_err(|_| EmbeddingError::Folded)
     }
 
     /// As [`Self::solve`], [`Folded`] where no map without folds was found.
     pub(in crate::embed) fn attempt(
         &mut self,
-        net: Net,
+        net: EmbeddingTopology,
         progress: &Progress,
     ) -> Result<Result<State, Folded>, EmbeddingError> {
         let State { metric: before, field, solution, .. } = &self.state;
@@ -378,7 +382,7 @@ impl<'a> Optimizer<'a> {
             None => Default::default(),
         };
         let start = Start::Moved { uv: &uv, gradients: &list, turned: &turned };
-        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: NEWTON_STEPS });
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::InjectiveMap { shape, start, steps: NEWTON_STEPS });
         self.solve_for(net, aim, progress)
     }
 
@@ -389,25 +393,25 @@ impl<'a> Optimizer<'a> {
     ) -> Result<Result<State, Folded>, EmbeddingError> {
         let uv = self.state.solution.map.uv.clone();
         let start = Start::Here(&uv);
-        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: NEWTON_STEPS });
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::InjectiveMap { shape, start, steps: NEWTON_STEPS });
         self.solve_for(self.state.net.clone(), aim, progress)
     }
 
     /// As [`Self::attempt`], with the map without folds nearest to one of these coordinates, which is left as it is.
     pub(in crate::embed) fn attempt_at(
         &mut self,
-        net: Net,
+        net: EmbeddingTopology,
         uv: &[[DVec2; 3]],
         progress: &Progress,
     ) -> Result<Result<State, Folded>, EmbeddingError> {
         let start = Start::Map(uv);
-        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::Injective { shape, start, steps: 0 });
+        let aim = self.shape.map_or(Aim::LeastSquares, |shape| Aim::InjectiveMap { shape, start, steps: 0 });
         self.solve_for(net, aim, progress)
     }
 
     fn solve_for(
         &mut self,
-        net: Net,
+        net: EmbeddingTopology,
         aim: Aim<'_>,
         progress: &Progress,
     ) -> Result<Result<State, Folded>, EmbeddingError> {
@@ -415,7 +419,7 @@ impl<'a> Optimizer<'a> {
         let mut solver = Solver {
             curvature: &self.curvature,
             sharp: &self.sharp,
-            roads: &self.roads,
+            through_arcs: &self.through_arcs,
             spacing: &self.spacing,
             guided: &self.guided,
             seamless: self.seamless.take(),
@@ -431,10 +435,10 @@ impl<'a> Optimizer<'a> {
 
     /// The triangles around nodes that are at another vertex in `net` than before, and around those vertices. Nodes that
     /// are not held move through the map, not with it: around these it is enough that they have moved at all.
-    fn turned(&self, net: &Net) -> Vec<bool> {
+    fn turned(&self, net: &EmbeddingTopology) -> Vec<bool> {
         let mesh = &net.mesh;
         let mut near = vec![false; mesh.n_vertices()];
-        for ((old, new), held) in self.state.net.nodes.iter().zip(&net.nodes).zip(&self.roads.held) {
+        for ((old, new), held) in self.state.net.nodes.iter().zip(&net.nodes).zip(&self.through_arcs.constrained) {
             let stays = self.state.net.mesh.position(old.vertex) == net.mesh.position(new.vertex);
             if old.vertex == new.vertex && (stays || *held) {
                 continue;
@@ -457,7 +461,7 @@ impl<'a> Optimizer<'a> {
 }
 
 /// For each node whether it is pinned, itself or as the end of an arc.
-fn pinned(job: &Job<'_>) -> Vec<bool> {
+fn pinned(job: &Problem<'_>) -> Vec<bool> {
     let mut held = job.pinned_nodes.to_vec();
     held.resize(job.layout.nodes.len(), false);
     for (arc, _) in job.layout.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {

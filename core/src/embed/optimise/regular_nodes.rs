@@ -10,12 +10,12 @@ use glam::{DVec2, DVec3};
 
 use crate::embed::EmbeddingError;
 use crate::embed::optimise::isoline_crossing::crossing;
-use crate::embed::optimise::optimiser::Optimizer;
-use crate::embed::optimise::relocation::Hold;
+use crate::embed::optimise::optimiser::Optimiser;
+use crate::embed::optimise::relocation::NodeConstraint;
 use crate::embed::parameterise::chord_lengths::transition;
 use crate::embed::parameterise::solve::{Features, Folded};
 use crate::embed::parameterise::state::State;
-use crate::embed::topology::embedding_topology::Net;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::embed::topology::through_arcs::around;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::param::SeamlessMap;
@@ -39,7 +39,7 @@ pub(in crate::embed) struct Crossing {
     pub strip: Vec<FaceId>,
 }
 
-impl Optimizer<'_> {
+impl Optimiser<'_> {
     /// Brings regular nodes to the crossings of their isolines without changing the map but near them.
     ///
     /// # Errors
@@ -55,7 +55,7 @@ impl Optimizer<'_> {
                 Ok(state) => {
                     self.state = state;
                     for i in on_feature {
-                        self.ground.hold[i] = Hold::Curve;
+                        self.ground.hold[i] = NodeConstraint::Curve;
                     }
                     return Ok(());
                 }
@@ -75,11 +75,15 @@ impl Optimizer<'_> {
     }
 
     /// The net with regular nodes at their crossings but for those that stay, and which of them came onto features.
-    fn at_crossings(&self, stays: &[bool]) -> (Net, Vec<usize>) {
+    fn at_crossings(&self, stays: &[bool]) -> (EmbeddingTopology, Vec<usize>) {
         let mut net = self.state.net.clone();
         let mut on_feature = Vec::new();
         for (i, &stays) in stays.iter().enumerate() {
-            if self.roads.held[i] || stays || self.ground.hold[i] == Hold::Fixed || net.nodes[i].boundary {
+            if self.through_arcs.constrained[i]
+                || stays
+                || self.ground.hold[i] == NodeConstraint::Fixed
+                || net.nodes[i].boundary
+            {
                 continue;
             }
             let Some(crossing) = self.crossing_of(i) else { continue };
@@ -98,7 +102,7 @@ impl Optimizer<'_> {
     }
 
     /// Whether the map read off anew has no folds around the vertex that a node has left and the one it has come to.
-    fn fits(&self, moved: &Net, from: VertexId, node: usize) -> bool {
+    fn fits(&self, moved: &EmbeddingTopology, from: VertexId, node: usize) -> bool {
         let around = |v: VertexId| moved.mesh.outgoing(v).map(|h| moved.mesh.face(h));
         around(from).chain(around(moved.nodes[node].vertex)).all(|f| {
             let [a, b, c] = moved.mesh.face_halfedges(f).map(|h| self.corner_of(moved, h));
@@ -108,19 +112,19 @@ impl Optimizer<'_> {
 
     fn crossing_of(&self, i: usize) -> Option<Crossing> {
         let State { net, solution, .. } = &self.state;
-        let (h, target) = crossing(net, &self.roads, &solution.map, &self.ends[i])?;
+        let (h, target) = crossing(net, &self.through_arcs, &solution.map, &self.ends[i])?;
         locate(net, &solution.map, net.mesh.face(h), target)
     }
 
     /// The coordinates of the corners of each triangle of a net whose vertices have partly moved: those of the present map
     /// at the same places of the surface.
-    fn read_off(&self, moved: &Net) -> Vec<[DVec2; 3]> {
+    fn read_off(&self, moved: &EmbeddingTopology) -> Vec<[DVec2; 3]> {
         let mesh = &moved.mesh;
         mesh.faces().map(|f| mesh.face_halfedges(f).map(|h| self.corner_of(moved, h))).collect()
     }
 
     /// The coordinates of one corner.
-    fn corner_of(&self, moved: &Net, h: HalfedgeId) -> DVec2 {
+    fn corner_of(&self, moved: &EmbeddingTopology, h: HalfedgeId) -> DVec2 {
         let State { net, solution, .. } = &self.state;
         let (mesh, map, v) = (&net.mesh, &solution.map, net.mesh.origin(h));
         let read = || {
@@ -135,7 +139,7 @@ impl Optimizer<'_> {
 
 /// The coordinates of the point nearest to `place` in the triangles around a vertex, in the frame of that of the corner
 /// returned.
-fn read_at(net: &Net, map: &SeamlessMap, v: VertexId, place: DVec3) -> Option<(HalfedgeId, DVec2)> {
+fn read_at(net: &EmbeddingTopology, map: &SeamlessMap, v: VertexId, place: DVec3) -> Option<(HalfedgeId, DVec2)> {
     let mesh = &net.mesh;
     let point = |h: HalfedgeId| {
         let f = mesh.face(h);
@@ -150,7 +154,7 @@ fn read_at(net: &Net, map: &SeamlessMap, v: VertexId, place: DVec3) -> Option<(H
 }
 
 /// The point with coordinates `target` in the frame of triangle `from`, as near as can be to that.
-fn locate(net: &Net, map: &SeamlessMap, from: FaceId, target: DVec2) -> Option<Crossing> {
+fn locate(net: &EmbeddingTopology, map: &SeamlessMap, from: FaceId, target: DVec2) -> Option<Crossing> {
     let mesh = &net.mesh;
     let inside = |f: FaceId, at: DVec2| Some((f, weights(&map.uv[f.index()], at)?));
     let ((face, weights), strip) = outward(net, map, [(from, target)], inside)?;
@@ -163,7 +167,7 @@ fn locate(net: &Net, map: &SeamlessMap, from: FaceId, target: DVec2) -> Option<C
 /// triangle with what these coordinates become there, until something is `found`. Returned with it is the way back, from
 /// the triangle where it was found to one of the first.
 pub(in crate::embed) fn outward<T>(
-    net: &Net,
+    net: &EmbeddingTopology,
     map: &SeamlessMap,
     first: impl IntoIterator<Item = (FaceId, DVec2)>,
     mut found: impl FnMut(FaceId, DVec2) -> Option<T>,

@@ -9,10 +9,10 @@ use std::collections::{HashMap, VecDeque};
 use glam::{DVec2, DVec3};
 
 use crate::embed::optimise::regular_nodes::Crossing;
-use crate::embed::topology::embedding_topology::Net;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
-use crate::surface::{SurfaceIndex, straightest};
+use crate::surface::{SurfaceIndex, trace_geodesic};
 
 /// How often a step that is not possible is halved before the node stays.
 const HALVINGS: usize = 4;
@@ -24,7 +24,7 @@ const TILT: f64 = 0.2;
 
 /// What holds a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hold {
+pub enum NodeConstraint {
     /// Nothing: it moves freely on the surface.
     Free,
     /// It slides along a feature or the boundary.
@@ -34,7 +34,7 @@ pub enum Hold {
 }
 
 /// Where nodes may go.
-pub(in crate::embed) struct Ground<'a> {
+pub(in crate::embed) struct SurfaceProjection<'a> {
     /// The surface.
     pub surface: &'a TriMesh,
     /// Its points by nearness.
@@ -46,16 +46,16 @@ pub(in crate::embed) struct Ground<'a> {
     /// Whether each vertex is on such an edge.
     pub on_curve: Vec<bool>,
     /// What holds each node.
-    pub hold: Vec<Hold>,
+    pub hold: Vec<NodeConstraint>,
     /// How close irregular nodes may come to each other.
     pub apart: f64,
 }
 
-impl Ground<'_> {
+impl SurfaceProjection<'_> {
     /// Moves a free node in polar direction and length `step`; returns how far it got.
     pub(in crate::embed) fn glide(
         &self,
-        net: &mut Net,
+        net: &mut EmbeddingTopology,
         metric: &Metric,
         node: usize,
         step: DVec2,
@@ -64,10 +64,10 @@ impl Ground<'_> {
         let v = net.nodes[node].vertex;
         let mut length = step.length();
         for _ in 0..=HALVINGS {
-            let trace = straightest(&net.mesh, metric, v, step.to_angle().rem_euclid(std::f64::consts::TAU), length);
+            let trace = trace_geodesic(&net.mesh, metric, v, step.to_angle().rem_euclid(std::f64::consts::TAU), length);
             let own = net.mesh.face_vertices(trace.end.face).iter().any(|w| cell[w.index()] == node as u32);
             let place = self.index.nearest(trace.end.position(&net.mesh)).position(self.surface);
-            if !trace.stopped && own && self.keeps_apart(net, node, place) {
+            if !trace.hit_boundary && own && self.keeps_apart(net, node, place) {
                 let strip = strip(&net.mesh, trace.first, &trace.crossed);
                 if self.settle(net, node, place, trace.end.face, &strip) {
                     return length;
@@ -80,7 +80,7 @@ impl Ground<'_> {
 
     /// Whether a node at `place` is far enough from the others, or at least no closer than it was. Irregular nodes that
     /// come close together circle each other and wind up their arcs.
-    fn keeps_apart(&self, net: &Net, node: usize, place: DVec3) -> bool {
+    fn keeps_apart(&self, net: &EmbeddingTopology, node: usize, place: DVec3) -> bool {
         let old = net.mesh.position(net.nodes[node].vertex);
         net.nodes[node].is_regular()
             || net.nodes.iter().enumerate().filter(|&(i, n)| i != node && !n.is_regular()).all(|(_, n)| {
@@ -91,7 +91,7 @@ impl Ground<'_> {
     }
 
     /// Puts the node at `place` in `face`, by one of its corners; nothing changes if none will do.
-    fn settle(&self, net: &mut Net, node: usize, place: DVec3, face: FaceId, strip: &[FaceId]) -> bool {
+    fn settle(&self, net: &mut EmbeddingTopology, node: usize, place: DVec3, face: FaceId, strip: &[FaceId]) -> bool {
         let from = net.nodes[node].vertex;
         let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
         let mut corners: Vec<VertexId> = net.mesh.face_vertices(face).to_vec();
@@ -112,11 +112,11 @@ impl Ground<'_> {
     /// a feature that is `held` by an end of that edge.
     pub(in crate::embed) fn put_at<'n>(
         &'n self,
-        net: &'n Net,
+        net: &'n EmbeddingTopology,
         node: usize,
         at: &'n Crossing,
         held: impl Fn(HalfedgeId) -> bool,
-    ) -> impl Iterator<Item = Net> + 'n {
+    ) -> impl Iterator<Item = EmbeddingTopology> + 'n {
         let from = net.nodes[node].vertex;
         let sides = net.mesh.face_halfedges(at.face);
         let place = self.index.nearest(at.place).position(self.surface);
@@ -137,14 +137,20 @@ impl Ground<'_> {
     }
 
     /// Brings a node along edges to a vertex that is put at `place`; nothing changes if triangles would suffer.
-    fn bring(&self, net: &mut Net, node: usize, (path, to): (&[HalfedgeId], VertexId), place: DVec3) -> bool {
+    fn bring(
+        &self,
+        net: &mut EmbeddingTopology,
+        node: usize,
+        (path, to): (&[HalfedgeId], VertexId),
+        place: DVec3,
+    ) -> bool {
         let from = net.nodes[node].vertex;
         let old = net.mesh.position(from);
         let before = self.at_rest(&net.mesh, from, to);
         net.mesh.set_position(from, self.home[from.index()]);
         net.mesh.set_position(to, place);
         if sound(&net.mesh, &before) {
-            path.iter().for_each(|&h| net.move_along(node, h));
+            path.iter().for_each(|&h| net.move_node(node, h));
             return true;
         }
         net.mesh.set_position(to, self.home[to.index()]);
@@ -168,7 +174,13 @@ impl Ground<'_> {
     }
 
     /// Slides a node along its curve by `length`, the way that agrees most with `direction`; returns how far it got.
-    pub(in crate::embed) fn slide(&self, net: &mut Net, node: usize, direction: DVec3, length: f64) -> f64 {
+    pub(in crate::embed) fn slide(
+        &self,
+        net: &mut EmbeddingTopology,
+        node: usize,
+        direction: DVec3,
+        length: f64,
+    ) -> f64 {
         let mut left = length;
         let mut at = net.mesh.position(net.nodes[node].vertex);
         let mut v = net.nodes[node].vertex;
@@ -209,7 +221,7 @@ impl Ground<'_> {
         0.0
     }
 
-    fn put(&self, net: &mut Net, node: usize, path: &[HalfedgeId], place: DVec3, moved: f64) -> f64 {
+    fn put(&self, net: &mut EmbeddingTopology, node: usize, path: &[HalfedgeId], place: DVec3, moved: f64) -> f64 {
         let from = net.nodes[node].vertex;
         let mut to = from;
         for &h in path {
@@ -221,7 +233,7 @@ impl Ground<'_> {
         net.mesh.set_position(to, place);
         if sound(&net.mesh, &before) {
             for &h in path {
-                net.move_along(node, h);
+                net.move_node(node, h);
             }
             return moved;
         }

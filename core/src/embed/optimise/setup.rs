@@ -2,16 +2,16 @@
 
 use glam::DVec3;
 
-use crate::embed::optimise::relocation::{Ground, Hold};
+use crate::embed::optimise::relocation::{NodeConstraint, SurfaceProjection};
 use crate::embed::problem::{Settings, Surface};
-use crate::embed::topology::embedding_topology::Net;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{TriMesh, VertexId};
 
 /// How close irregular nodes may come to each other on the surface, in least lengths of arcs.
 const APART: f64 = 1.5;
 
 /// The sharp edges of the working mesh: those of the surface and their halves where a node was inserted.
-pub(in crate::embed) fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<bool> {
+pub(in crate::embed) fn sharp_edges(surface: &Surface<'_>, net: &EmbeddingTopology) -> Vec<bool> {
     let n = surface.mesh.n_vertices();
     let pair = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
     let sharp: std::collections::BTreeSet<_> = surface
@@ -43,11 +43,11 @@ pub(in crate::embed) fn sharp_edges(surface: &Surface<'_>, net: &Net) -> Vec<boo
 
 pub(in crate::embed) fn ground<'a>(
     surface: &Surface<'a>,
-    net: &Net,
+    net: &EmbeddingTopology,
     sharp: &[bool],
     pinned: impl Fn(usize) -> bool,
     settings: Settings,
-) -> Ground<'a> {
+) -> SurfaceProjection<'a> {
     let mesh = &net.mesh;
     let curve: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] || mesh.is_boundary_edge(e)).collect();
     let mut degree = vec![0; mesh.n_vertices()];
@@ -61,14 +61,14 @@ pub(in crate::embed) fn ground<'a>(
         .iter()
         .enumerate()
         .map(|(i, n)| match degree[n.vertex.index()] {
-            _ if pinned(i) => Hold::Fixed,
-            0 => Hold::Free,
-            2 if !turns(mesh, &curve, n.vertex) => Hold::Curve,
-            _ => Hold::Fixed,
+            _ if pinned(i) => NodeConstraint::Fixed,
+            0 => NodeConstraint::Free,
+            2 if !turns(mesh, &curve, n.vertex) => NodeConstraint::Curve,
+            _ => NodeConstraint::Fixed,
         })
         .collect();
     let on_curve = degree.iter().map(|&d| d > 0).collect();
-    Ground {
+    SurfaceProjection {
         surface: surface.mesh,
         index: surface.index,
         home: mesh.positions().to_vec(),

@@ -6,22 +6,22 @@
 //! left alone rather than torn.
 
 use crate::embed::parameterise::feature_axes::{self, Headed, heading_in};
-use crate::embed::topology::embedding_topology::Net;
-use crate::embed::topology::through_arcs::{Crossroads, corner};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::embed::topology::through_arcs::{ThroughArcs, corner_point};
 use crate::mesh::HalfedgeId;
-use crate::param::Relation;
+use crate::param::CoordinateConstraint;
 use crate::surface::Metric;
 
 /// What the layout demands to be isolines.
-pub(in crate::embed) fn demanded(net: &Net, roads: &Crossroads) -> Vec<Relation> {
-    let chain = |c: crate::embed::topology::through_arcs::Chain| Relation {
-        from: corner(c.start),
+pub(in crate::embed) fn demanded(net: &EmbeddingTopology, through_arcs: &ThroughArcs) -> Vec<CoordinateConstraint> {
+    let chain = |c: crate::embed::topology::through_arcs::TriangleChain| CoordinateConstraint {
+        from: corner_point(c.start),
         crossed: c.crossed,
-        to: corner(c.end),
+        to: corner_point(c.end),
         axis: across(i32::from(c.heading)),
         difference: 0.0,
     };
-    let mut relations: Vec<Relation> = roads.chains(net).into_iter().map(chain).collect();
+    let mut relations: Vec<CoordinateConstraint> = through_arcs.chains(net).into_iter().map(chain).collect();
     let border = net.mesh.edges().map(|e| net.mesh.halfedge(e));
     let bordering = border.filter_map(|h| net.boundary.get(&h).map(|&(k, _)| on_edge(net, (h, across(i32::from(k))))));
     relations.extend(bordering);
@@ -29,8 +29,14 @@ pub(in crate::embed) fn demanded(net: &Net, roads: &Crossroads) -> Vec<Relation>
 }
 
 /// That an edge is an isoline of a coordinate.
-pub(in crate::embed) fn on_edge(net: &Net, (h, axis): (HalfedgeId, u8)) -> Relation {
-    Relation { from: corner(h), crossed: Vec::new(), to: corner(net.mesh.next(h)), axis, difference: 0.0 }
+pub(in crate::embed) fn on_edge(net: &EmbeddingTopology, (h, axis): (HalfedgeId, u8)) -> CoordinateConstraint {
+    CoordinateConstraint {
+        from: corner_point(h),
+        crossed: Vec::new(),
+        to: corner_point(net.mesh.next(h)),
+        axis,
+        difference: 0.0,
+    }
 }
 
 /// The coordinate that is constant along a heading.
@@ -47,7 +53,7 @@ pub(in crate::embed) const WHOLE: f64 = 4.0;
 /// The half-edges of features that can be isolines where the field has these angles, and of which coordinate; those first
 /// that the field follows best. Left out are those that deviate by more than `slant` quarter turns from the field.
 pub(in crate::embed) fn features(
-    net: &Net,
+    net: &EmbeddingTopology,
     metric: &Metric,
     angle: &[f64],
     sharp: &[bool],
@@ -55,7 +61,7 @@ pub(in crate::embed) fn features(
 ) -> Vec<(HalfedgeId, u8)> {
     let mesh = &net.mesh;
     let mut found: Vec<Option<Headed>> = vec![None; mesh.n_edges()];
-    for headed in feature_axes::headings(net, metric, angle, sharp).into_iter().filter(|h| h.off < slant) {
+    for headed in feature_axes::arc_headings(net, metric, angle, sharp).into_iter().filter(|h| h.off < slant) {
         found[mesh.edge(headed.halfedge).index()] = Some(headed);
     }
     for f in mesh.faces() {

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-use crate::embed::topology::embedding_topology::{Net, jump_across};
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, jump_across};
 use crate::mesh::{HalfedgeId, VertexId};
 use crate::surface::Metric;
 
@@ -26,7 +26,12 @@ pub(in crate::embed) struct Headed {
 }
 
 /// The headings of all edges that are `sharp`, in the frames of a field of these angles; those on the boundary have none.
-pub(in crate::embed) fn headings(net: &Net, metric: &Metric, angle: &[f64], sharp: &[bool]) -> Vec<Headed> {
+pub(in crate::embed) fn arc_headings(
+    net: &EmbeddingTopology,
+    metric: &Metric,
+    angle: &[f64],
+    sharp: &[bool],
+) -> Vec<Headed> {
     let lines = Lines::new(net, sharp);
     let mut all = Vec::new();
     for line in lines.all() {
@@ -36,20 +41,20 @@ pub(in crate::embed) fn headings(net: &Net, metric: &Metric, angle: &[f64], shar
 }
 
 /// The lines of all features, each as half-edges from corner to corner or node to node, or once around.
-pub(in crate::embed) fn lines(net: &Net, sharp: &[bool]) -> Vec<Vec<HalfedgeId>> {
+pub(in crate::embed) fn lines(net: &EmbeddingTopology, sharp: &[bool]) -> Vec<Vec<HalfedgeId>> {
     Lines::new(net, sharp).all()
 }
 
 /// The features of a mesh as a graph.
 struct Lines<'a> {
-    net: &'a Net,
+    net: &'a EmbeddingTopology,
     feature: Vec<bool>,
     /// Whether a line ends at each vertex.
     ends: Vec<bool>,
 }
 
 impl<'a> Lines<'a> {
-    fn new(net: &'a Net, sharp: &[bool]) -> Self {
+    fn new(net: &'a EmbeddingTopology, sharp: &[bool]) -> Self {
         let mesh = &net.mesh;
         let feature: Vec<bool> = mesh.edges().map(|e| sharp[e.index()] && !mesh.is_boundary_edge(e)).collect();
         let rays = |v: VertexId| mesh.outgoing(v).filter(|&h| feature[mesh.edge(h).index()]);
@@ -90,7 +95,7 @@ impl<'a> Lines<'a> {
 }
 
 /// The headings along one line.
-fn headed(net: &Net, metric: &Metric, angle: &[f64], line: &[HalfedgeId]) -> Vec<Headed> {
+fn headed(net: &EmbeddingTopology, metric: &Metric, angle: &[f64], line: &[HalfedgeId]) -> Vec<Headed> {
     let mesh = &net.mesh;
     // The frame of the first triangle, carried along to the left of the line.
     let mut turned = vec![0];
@@ -123,7 +128,7 @@ fn headed(net: &Net, metric: &Metric, angle: &[f64], line: &[HalfedgeId]) -> Vec
 
 /// By how many quarters the frame of the triangle of `a` is to be turned to become that of `b`, around the vertex between
 /// them and to their left: direction `k` of the first is direction `k − turns` of the second.
-fn turns_between(net: &Net, a: HalfedgeId, b: HalfedgeId) -> Option<i32> {
+fn turns_between(net: &EmbeddingTopology, a: HalfedgeId, b: HalfedgeId) -> Option<i32> {
     let mesh = &net.mesh;
     let mut turns = 0;
     let mut at = b;
@@ -163,7 +168,7 @@ fn cheapest(n: usize, cost: impl Fn(usize, i32) -> f64) -> Vec<i32> {
 }
 
 /// The heading along a side in its own triangle, from that of its edge's half-edge in that one's triangle.
-pub(in crate::embed) fn heading_in(net: &Net, side: HalfedgeId, of: &Headed) -> i32 {
+pub(in crate::embed) fn heading_in(net: &EmbeddingTopology, side: HalfedgeId, of: &Headed) -> i32 {
     if of.halfedge == side {
         return of.heading;
     }
@@ -214,7 +219,7 @@ mod tests {
         let net = net();
         let metric = Metric::new(&net.mesh);
         let sharp = vec![true; net.mesh.n_edges()];
-        for headed in headings(&net, &metric, &net.angle, &sharp) {
+        for headed in arc_headings(&net, &metric, &net.angle, &sharp) {
             let h = headed.halfedge;
             let turns = (metric.direction(h) - net.angle[net.mesh.face(h).index()]) / FRAC_PI_2;
             let off = turns - f64::from(headed.heading);

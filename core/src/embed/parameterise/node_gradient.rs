@@ -10,7 +10,7 @@
 use glam::DVec2;
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::param::{Density, Objective, Shape};
+use crate::param::{DistortionWeights, EnergyDensity, Objective};
 use crate::surface::Metric;
 use crate::surface::PolarMap;
 
@@ -44,12 +44,12 @@ pub(in crate::embed) fn injective_descent(
     metric: &Metric,
     angle: &[f64],
     uv: &[[DVec2; 3]],
-    (objective, shape, firmness): (&Objective, Shape, &[f64]),
+    (objective, shape, anisotropy_share): (&Objective, DistortionWeights, &[f64]),
     v: VertexId,
 ) -> DVec2 {
-    let share = |w: &Wedge| firmness.get(w.face.index()).copied().unwrap_or(1.0);
+    let share = |w: &Wedge| anisotropy_share.get(w.face.index()).copied().unwrap_or(1.0);
     let wedges = wedges(mesh, metric, angle, uv, objective, v);
-    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.at_firmness(share(w)))).sum()
+    wedges.iter().map(|w| -w.injective_gradient(DVec2::ZERO, shape.with_anisotropy_share(share(w)))).sum()
 }
 
 fn wedges(
@@ -112,9 +112,9 @@ impl Wedge {
     }
 
     /// As [`Self::gradient`], of an energy density `e(∇u, ∇v)`: `A [e φ − (∂e/∂∇u·φ) ∇u − (∂e/∂∇v·φ) ∇v]`.
-    fn injective_gradient(&self, h: DVec2, shape: Shape) -> DVec2 {
+    fn injective_gradient(&self, h: DVec2, shape: DistortionWeights) -> DVec2 {
         let (area, phi, j) = self.matrix(h);
-        let density = Density::new(shape, self.lengths);
+        let density = EnergyDensity::new(shape, self.lengths);
         let Some(e) = density.value(&j) else { return DVec2::ZERO };
         let pull = density.gradient(&j);
         let across = self.axis.perp();
@@ -124,9 +124,9 @@ impl Wedge {
     }
 
     #[cfg(test)]
-    fn injective_energy(&self, h: DVec2, shape: Shape) -> f64 {
+    fn injective_energy(&self, h: DVec2, shape: DistortionWeights) -> f64 {
         let (area, _, j) = self.matrix(h);
-        area * Density::new(shape, self.lengths).value(&j).unwrap()
+        area * EnergyDensity::new(shape, self.lengths).value(&j).unwrap()
     }
 
     #[cfg(test)]
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn so_does_that_of_maps_without_folds() {
-        let shape = Shape { anisotropy: 3.0, size: 0.3 };
+        let shape = DistortionWeights { anisotropy: 3.0, size: 0.3 };
         let (n, turn) = (6, std::f64::consts::TAU / 6.0);
         // A bent ring: the identity and a bit more.
         let bent = |p: DVec2| p + DVec2::new(0.1 * p.y * p.y, 0.2 * p.x * p.y);

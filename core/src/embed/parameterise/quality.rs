@@ -18,7 +18,7 @@ use crate::layout::PatchMap;
 use crate::mesh::TriMesh;
 use crate::param::SeamlessMap;
 use crate::surface::PrincipalCurvature;
-use crate::surface::second_form;
+use crate::surface::second_fundamental_form;
 
 /// Largest conformal distortion of one triangle. Collapsed triangles would make any mean infinite; at 100, squares
 /// become rectangles of 1 to 100, the map is useless there and the triangle still counts by its area only.
@@ -120,7 +120,7 @@ fn measure(points: [DVec3; 3], uv: [DVec2; 3], bending: &PrincipalCurvature) -> 
         area: 0.5 * twice.length(),
         conformal: if conformal.is_finite() { conformal.clamp(2.0, WORST) } else { WORST },
         deviation: 0.5 * (deviation(p, bending) + deviation(q, bending)),
-        torsion: second_form(bending, p, q),
+        torsion: second_fundamental_form(bending, p, q),
         anisotropy: (bending.k_max - bending.k_min).powi(2),
         flipped: (uv[1] - uv[0]).perp_dot(uv[2] - uv[0]) <= 0.0,
     }

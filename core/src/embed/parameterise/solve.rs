@@ -10,15 +10,15 @@ use crate::embed::parameterise::chord_lengths::Spacing;
 use crate::embed::parameterise::constraints;
 use crate::embed::parameterise::state::State;
 use crate::embed::problem::Settings;
-use crate::embed::topology::embedding_topology::Net;
-use crate::embed::topology::through_arcs::Crossroads;
-use crate::field::{self, CrossField, GuidedSystem};
-use crate::field::{SizingSystem, rest_turns};
-use crate::field::{feature_guides, shape_guides};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::embed::topology::through_arcs::ThroughArcs;
+use crate::field::{self, CrossField, GuidingFieldSystem};
+use crate::field::{SizingSystem, residual_rotations};
+use crate::field::{feature_direction_penalties, principal_direction_penalties};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{
-    Effort, Injective, InjectiveEnergy, Objective, ParamError, Relation, SeamlessSystem, Shape, Solution, folds,
-    gradients,
+    CoordinateConstraint, DistortionWeights, Effort, InjectiveEnergy, InjectiveMap, Objective, ParamError,
+    SeamlessSystem, Solution, folds, gradients,
 };
 use crate::progress::Progress;
 use crate::solve::{SolveError, SpdSymbolic};
@@ -41,9 +41,9 @@ pub(in crate::embed) enum Aim<'s> {
     /// That of least squares.
     LeastSquares,
     /// One without folds.
-    Injective {
+    InjectiveMap {
         /// What it is to be like.
-        shape: Shape,
+        shape: DistortionWeights,
         /// Where it starts.
         start: Start<'s>,
         /// Steps of Newton's method at most.
@@ -111,9 +111,9 @@ pub(in crate::embed) struct Folded(pub Vec<FaceId>);
 pub(in crate::embed) struct Solver<'s> {
     pub curvature: &'s [PrincipalCurvature],
     pub sharp: &'s [bool],
-    pub roads: &'s Crossroads,
+    pub through_arcs: &'s ThroughArcs,
     pub spacing: &'s Spacing,
-    pub guided: &'s GuidedSystem,
+    pub guided: &'s GuidingFieldSystem,
     pub seamless: Option<SeamlessSystem>,
     pub sizes: Option<SpdSymbolic>,
     pub settings: Settings,
@@ -128,7 +128,7 @@ impl Solver<'_> {
     /// to be a map without folds and none was found.
     pub(in crate::embed) fn solve(
         &mut self,
-        net: Net,
+        net: EmbeddingTopology,
         metric: Metric,
         previous: Option<&[f64]>,
         aim: Aim<'_>,
@@ -136,15 +136,15 @@ impl Solver<'_> {
     ) -> Result<Result<State, Folded>, EmbeddingError> {
         let mesh = &net.mesh;
         let guessed = match aim {
-            Aim::Injective { start: Start::Turned(uv), .. } => Some(directions(&net, &metric, uv)),
+            Aim::InjectiveMap { start: Start::Turned(uv), .. } => Some(directions(&net, &metric, uv)),
             _ => None,
         };
         // A map of least squares is torn by what contradicts it; one without folds shows what can be followed.
-        let whole = matches!(aim, Aim::Injective { .. });
-        let shape = shape_guides(mesh, &metric, self.curvature, self.sharp, whole);
+        let whole = matches!(aim, Aim::InjectiveMap { .. });
+        let shape = principal_direction_penalties(mesh, &metric, self.curvature, self.sharp, whole);
         let angle = self.angles((&net, &metric), &shape, previous.or(guessed.as_deref()), progress)?;
         let field = field::cross_field(mesh, &metric, &angle, &net.jump);
-        let firmness = firmness(mesh, self.curvature);
+        let anisotropy_share = anisotropy_share(mesh, self.curvature);
         let nodes: Vec<VertexId> = net.nodes.iter().filter(|n| !n.boundary).map(|n| n.vertex).collect();
         let slant = if whole { constraints::WHOLE } else { constraints::SLANT };
         let features = constraints::features(&net, &metric, &field.angle, self.sharp, slant);
@@ -165,29 +165,35 @@ impl Solver<'_> {
         progress.check()?;
         let solution = match aim {
             Aim::LeastSquares => Ok(system.solve(&metric, &field, &objective, progress)?),
-            Aim::Injective { shape, start, steps } => {
-                let firmness = &firmness;
+            Aim::InjectiveMap { shape, start, steps } => {
+                let anisotropy_share = &anisotropy_share;
                 let pulled = &pulled;
-                let setting =
-                    Setting { net: &net, metric: &metric, field: &field, objective: &objective, firmness, pulled };
+                let setting = Setting {
+                    net: &net,
+                    metric: &metric,
+                    field: &field,
+                    objective: &objective,
+                    anisotropy_share,
+                    pulled,
+                };
                 setting.injective(&mut system, shape, start, steps, progress)?
             }
         };
         self.seamless = Some(system);
-        Ok(solution.map(|solution| State { net, metric, field, objective, firmness, solution }))
+        Ok(solution.map(|solution| State { net, metric, field, objective, anisotropy_share, solution }))
     }
 
     /// Sets up the system of the map. Features and spacing that contradict what the layout demands are left out.
     fn build(
         &mut self,
-        net: &Net,
+        net: &EmbeddingTopology,
         field: &CrossField,
         nodes: &[VertexId],
         features: &[(HalfedgeId, u8)],
     ) -> Result<SeamlessSystem, EmbeddingError> {
-        let demanded = constraints::demanded(net, self.roads);
-        let mut features: Vec<Relation> = features.iter().map(|&f| constraints::on_edge(net, f)).collect();
-        let mut spacing = self.spacing.relations(net, self.roads);
+        let demanded = constraints::demanded(net, self.through_arcs);
+        let mut features: Vec<CoordinateConstraint> = features.iter().map(|&f| constraints::on_edge(net, f)).collect();
+        let mut spacing = self.spacing.relations(net, self.through_arcs);
         let mut system = self.seamless.take();
         loop {
             let relations: Vec<_> = demanded.iter().chain(&spacing).chain(&features).cloned().collect();
@@ -218,8 +224,8 @@ impl Solver<'_> {
     /// rounds.
     fn angles(
         &self,
-        (net, metric): (&Net, &Metric),
-        shape: &[field::Guide],
+        (net, metric): (&EmbeddingTopology, &Metric),
+        shape: &[field::DirectionPenalty],
         previous: Option<&[f64]>,
         progress: &Progress,
     ) -> Result<Vec<f64>, EmbeddingError> {
@@ -232,11 +238,11 @@ impl Solver<'_> {
         for round in 0..rounds {
             // At first features draw the field towards them; those that it still contradicts do not bend it.
             let convinced = previous.is_some() || round >= FIRST_ROUNDS / 2;
-            let keep = |g: &field::Guide| match g.branch {
+            let keep = |g: &field::DirectionPenalty| match g.branch {
                 None if convinced => agreeing(g, angle[g.face.index()]),
                 _ => Some(*g),
             };
-            let mut guides: Vec<field::Guide> = held.iter().filter_map(keep).collect();
+            let mut guides: Vec<field::DirectionPenalty> = held.iter().filter_map(keep).collect();
             guides.extend(shape.iter().filter_map(|g| agreeing(g, angle[g.face.index()])));
             angle = self.guided.solve(mesh, metric, &net.jump, &guides, Some(&angle), progress)?.angle;
         }
@@ -245,10 +251,10 @@ impl Solver<'_> {
 
     /// Directions that hold whatever the field: those of features, of which it is open which direction of a cross
     /// follows them, those of the boundary, of which the layout tells, and weakly those of the drawing.
-    fn held_directions(&self, net: &Net, metric: &Metric) -> Vec<field::Guide> {
+    fn held_directions(&self, net: &EmbeddingTopology, metric: &Metric) -> Vec<field::DirectionPenalty> {
         let mesh = &net.mesh;
-        let mut guides = feature_guides(mesh, metric, self.sharp);
-        guides.extend(mesh.faces().map(|face| field::Guide {
+        let mut guides = feature_direction_penalties(mesh, metric, self.sharp);
+        guides.extend(mesh.faces().map(|face| field::DirectionPenalty {
             face,
             angle: net.angle[face.index()],
             weight: DRAWN * metric.area(face),
@@ -257,7 +263,12 @@ impl Solver<'_> {
         for h in mesh.halfedges().filter(|h| mesh.twin(*h).is_none()) {
             if let Some(&(k, _)) = net.boundary.get(&h) {
                 let (face, angle) = (mesh.face(h), metric.direction(h));
-                guides.push(field::Guide { face, angle, weight: field::RELIABLE, branch: Some(i32::from(k)) });
+                guides.push(field::DirectionPenalty {
+                    face,
+                    angle,
+                    weight: field::RELIABLE_PENALTY,
+                    branch: Some(i32::from(k)),
+                });
             }
         }
         guides
@@ -266,11 +277,11 @@ impl Solver<'_> {
 
 /// All that a map depends on besides its system.
 struct Setting<'s> {
-    net: &'s Net,
+    net: &'s EmbeddingTopology,
     metric: &'s Metric,
     field: &'s CrossField,
     objective: &'s Objective,
-    firmness: &'s [f64],
+    anisotropy_share: &'s [f64],
     pulled: &'s [(HalfedgeId, u8, f64)],
 }
 
@@ -278,12 +289,12 @@ impl Setting<'_> {
     fn injective(
         &self,
         system: &mut SeamlessSystem,
-        shape: Shape,
+        shape: DistortionWeights,
         start: Start<'_>,
         steps: usize,
         progress: &Progress,
     ) -> Result<Result<Solution, Folded>, EmbeddingError> {
-        let Self { net, metric, field, objective, firmness, pulled } = *self;
+        let Self { net, metric, field, objective, anisotropy_share, pulled } = *self;
         let wanted = match start {
             Start::Map(uv) | Start::Here(uv) => gradients(metric, &field.angle, uv),
             Start::Turned(uv) => gradients(metric, &field.angle, uv).into_iter().map(along_field).collect(),
@@ -295,7 +306,8 @@ impl Setting<'_> {
                 list
             }
         };
-        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).pulling(pulled);
+        let energy = InjectiveEnergy::new(metric, &field.angle, objective, (shape, anisotropy_share))
+            .with_isoline_penalties(pulled);
         let newton = system.newton()?;
         let few = match start {
             Start::Map(_) | Start::Turned(_) => FEW_AT_FIRST,
@@ -328,7 +340,7 @@ impl Setting<'_> {
             return Ok(Err(Folded(folded)));
         };
         system.descend(&newton, &energy, &mut at, steps, progress)?;
-        let Injective { map, free, energy } = at;
+        let InjectiveMap { map, free, energy } = at;
         Ok(Ok(Solution { map, free, energy }))
     }
 
@@ -371,7 +383,7 @@ fn along_field([a, b, c, d]: [f64; 4]) -> [f64; 4] {
 }
 
 /// The angles of the field nearest to that of the drawing that a map follows which is given up to quarter turns.
-fn directions(net: &Net, metric: &Metric, uv: &[[DVec2; 3]]) -> Vec<f64> {
+fn directions(net: &EmbeddingTopology, metric: &Metric, uv: &[[DVec2; 3]]) -> Vec<f64> {
     let turned = |g: [f64; 4]| {
         let [a, b, c, d] = along_field(g);
         (b - c).atan2(a + d)
@@ -388,14 +400,14 @@ fn lengths(
     symbolic: Option<SpdSymbolic>,
 ) -> Result<(Vec<[f64; 2]>, Option<SpdSymbolic>), SolveError> {
     let system = SizingSystem::new(mesh, metric, symbolic)?;
-    let rest = rest_turns(mesh, metric, angle, jump);
+    let rest = residual_rotations(mesh, metric, angle, jump);
     Ok((system.lengths(mesh, metric, &rest)?, Some(system.symbolic())))
 }
 
 /// By what factor the anisotropy counts in each triangle: 0 where the surface bends alike in all directions, 1
 /// where principal curvatures differ by as much as either is on average, and more where they differ more. It is
 /// this difference, squared, by which the deviation from principal directions is measured.
-fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
+fn anisotropy_share(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
     let mean_at = |f: FaceId, of: fn(&PrincipalCurvature) -> f64| {
         mesh.face_vertices(f).iter().map(|v| of(&curvature[v.index()])).sum::<f64>() / 3.0
     };
@@ -412,9 +424,9 @@ fn firmness(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
 /// The layout's structure prevails over principal directions: where both contradict each other, or a direction is
 /// wrongly taken for its neighbour a quarter turn away, the field would turn by a quarter within a few triangles and
 /// tear the map.
-fn agreeing(guide: &field::Guide, angle: f64) -> Option<field::Guide> {
+fn agreeing(guide: &field::DirectionPenalty, angle: f64) -> Option<field::DirectionPenalty> {
     let off = (guide.angle - angle) / FRAC_PI_2;
     let off = (off - off.round()).abs();
     let share = ((DISAGREES - off) / (DISAGREES - AGREES)).clamp(0.0, 1.0);
-    (share > 0.0).then_some(field::Guide { weight: guide.weight * share, ..*guide })
+    (share > 0.0).then_some(field::DirectionPenalty { weight: guide.weight * share, ..*guide })
 }

@@ -3,18 +3,18 @@
 use glam::DVec2;
 
 use crate::embed::problem::{FeatureEdges, Snapshot};
-use crate::embed::topology::embedding_topology::{Net, NetArc};
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
 use crate::embed::trace::arcs::{ArcChain, preview_arcs};
 use crate::field::CrossField;
 use crate::mesh::{EdgeId, VertexId};
-use crate::param::{InjectiveEnergy, Objective, Residual, Shape, Solution, residuals};
+use crate::param::{DistortionWeights, InjectiveEnergy, Objective, Residual, Solution, residuals};
 use crate::surface::Metric;
 
 /// Field and map for nodes at certain places.
 #[derive(Debug, Clone)]
 pub struct State {
     /// The net: mesh, nodes, arcs.
-    pub net: Net,
+    pub net: EmbeddingTopology,
     /// The planar layouts of the mesh's triangles.
     pub metric: Metric,
     /// The guiding field.
@@ -22,7 +22,7 @@ pub struct State {
     /// What the map minimises.
     pub objective: Objective,
     /// For each triangle the factor by which the anisotropy counts in a map without folds.
-    pub firmness: Vec<f64>,
+    pub anisotropy_share: Vec<f64>,
     /// The map and its energy.
     pub solution: Solution,
 }
@@ -57,12 +57,11 @@ impl State {
     }
 
     /// The energy of each triangle of the map: that of maps without folds of a shape, or that of least squares.
-    pub(in crate::embed) fn energies(&self, shape: Option<Shape>) -> Vec<f64> {
-        let Self { metric, field, objective, firmness, solution, .. } = self;
+    pub(in crate::embed) fn energies(&self, shape: Option<DistortionWeights>) -> Vec<f64> {
+        let Self { metric, field, objective, anisotropy_share, solution, .. } = self;
         match shape {
-            Some(shape) => {
-                InjectiveEnergy::new(metric, &field.angle, objective, (shape, firmness)).of_each(&solution.map.uv)
-            }
+            Some(shape) => InjectiveEnergy::new(metric, &field.angle, objective, (shape, anisotropy_share))
+                .of_each(&solution.map.uv),
             None => residuals(metric, &field.angle, &solution.map.uv, objective).iter().map(|r| r.energy).collect(),
         }
     }
@@ -82,7 +81,7 @@ impl State {
     }
 
     pub(in crate::embed) fn chains(&self) -> Vec<ArcChain<'_>> {
-        let chain = |a: &'_ NetArc| (a.start, a.end, a.heading);
+        let chain = |a: &'_ TopologyArc| (a.start, a.end, a.heading);
         self.net
             .arcs
             .iter()

@@ -6,8 +6,8 @@
 
 use serde::Serialize;
 
-use crate::embed::problem::Job;
-use crate::layout::{CollapseError, Collapsed, QuadLayout, RedrawError, Redrawn, redraw};
+use crate::embed::problem::Problem;
+use crate::layout::{CollapseError, CollapsedLayout, QuadLayout, Reembedded, ReembeddingError, redraw};
 use crate::progress::Progress;
 
 /// A chord that was collapsed.
@@ -23,7 +23,7 @@ pub struct CollapsedChord {
 
 /// A chord that is short and stays.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ShortChord {
+pub struct UncollapsedChord {
     /// Its number in the layout that was given.
     pub chord: u32,
     /// The length of its arcs.
@@ -45,7 +45,7 @@ pub(in crate::embed) struct Collapse<'a> {
     /// Those that are, in order.
     pub done: Vec<CollapsedChord>,
     /// Those that cannot be.
-    pub kept: Vec<ShortChord>,
+    pub kept: Vec<UncollapsedChord>,
 }
 
 impl<'a> Collapse<'a> {
@@ -106,11 +106,11 @@ impl<'a> Collapse<'a> {
 
     fn keep(&mut self, chord: u32, length: f64, reason: String) {
         self.kept.retain(|k| k.chord != chord);
-        self.kept.push(ShortChord { chord, length, reason });
+        self.kept.push(UncollapsedChord { chord, length, reason });
     }
 
     /// What is left, unless the chords cannot be deleted.
-    fn attempt(&self) -> Result<Collapsed, String> {
+    fn attempt(&self) -> Result<CollapsedLayout, String> {
         let collapsed = self.layout.without(&self.gone).map_err(|e: CollapseError| e.to_string())?;
         let mut taken: Vec<Option<usize>> = vec![None; collapsed.layout.nodes.len()];
         for n in (0..self.stays.len()).filter(|&n| self.stays[n]) {
@@ -122,9 +122,13 @@ impl<'a> Collapse<'a> {
     }
 
     /// What is left, drawn.
-    pub(in crate::embed) fn draw(&self, job: &Job<'_>, progress: &Progress) -> Result<Redrawn, RedrawError> {
+    pub(in crate::embed) fn draw(
+        &self,
+        job: &Problem<'_>,
+        progress: &Progress,
+    ) -> Result<Reembedded, ReembeddingError> {
         let n_surface = job.surface.mesh.n_vertices();
-        redraw(job.layout, job.drawing, &self.gone, |n| self.stays[n], n_surface, progress)
+        redraw(job.layout, job.initial_embedding, &self.gone, |n| self.stays[n], n_surface, progress)
     }
 
     /// Number of patches that a chord runs through.

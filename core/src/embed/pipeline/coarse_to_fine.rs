@@ -10,12 +10,12 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::pipeline::optimise::optimise;
 use crate::embed::pipeline::phases::Course;
-use crate::embed::problem::{Embedded, Job, Next, Settings, Snapshot, Surface};
-use crate::embed::topology::embedding_topology::Net;
-use crate::layout::{Embedding, Line, PatchMap, QuadLayout, carry};
+use crate::embed::problem::{Next, OptimisedEmbedding, Problem, Settings, Snapshot, Surface};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, carry};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
@@ -46,10 +46,10 @@ const FINE_STEPS: usize = 1;
 ///
 /// [`EmbeddingError::Cancelled`].
 pub(in crate::embed) fn coarse_to_fine(
-    job: &Job<'_>,
+    job: &Problem<'_>,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
-) -> Result<Option<Embedded>, EmbeddingError> {
+) -> Result<Option<OptimisedEmbedding>, EmbeddingError> {
     let Settings { collapse, simplify, integer, .. } = job.settings;
     let usual = collapse.is_none() && !simplify && integer.is_none();
     let pinned = job.pinned_nodes.iter().chain(job.pinned_arcs).any(|&p| p);
@@ -60,7 +60,7 @@ pub(in crate::embed) fn coarse_to_fine(
     let mut target = COARSE.max(PER_PATCH * patches);
     while job.surface.mesh.n_faces() > WORTH * target {
         let found = by_way_of_proxy(job, target, progress, watch);
-        progress.take_part(None);
+        progress.set_range(None);
         progress.check()?;
         match found {
             Ok(Some(done)) => return Ok(Some(done)),
@@ -74,36 +74,36 @@ pub(in crate::embed) fn coarse_to_fine(
 
 /// As [`coarse_to_fine`]; `None` if the layout cannot be carried to the proxy or back.
 fn by_way_of_proxy(
-    job: &Job<'_>,
+    job: &Problem<'_>,
     target: usize,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
-) -> Result<Option<Embedded>, EmbeddingError> {
-    let Job { surface, layout, .. } = *job;
-    progress.take_part(Some(SIMPLIFYING));
+) -> Result<Option<OptimisedEmbedding>, EmbeddingError> {
+    let Problem { surface, layout, .. } = *job;
+    progress.set_range(Some(SIMPLIFYING));
     progress.report("Simplifying the mesh", 0.0);
     let proxy = Proxy::new(surface.mesh, surface.sharp, target, progress)?;
     let levels = Levels { fine: surface.mesh, proxy: &proxy };
-    let Some(drawing) = levels.down(job, progress)? else { return Ok(None) };
+    let Some(initial_embedding) = levels.down(job, progress)? else { return Ok(None) };
     let mesh = proxy.mesh();
     let index = SurfaceIndex::new(mesh);
     let curvature: Vec<PrincipalCurvature> =
         mesh.vertices().map(|v| surface.curvature[proxy.original_vertex(v).index()]).collect();
     let coarse = Surface { mesh, index: &index, curvature: &curvature, sharp: proxy.sharp() };
-    progress.take_part(Some(ON_PROXY));
-    let on_proxy = Job { surface: coarse, drawing: &drawing, ..*job };
+    progress.set_range(Some(ON_PROXY));
+    let on_proxy = Problem { surface: coarse, initial_embedding: &initial_embedding, ..*job };
     let coarse = optimise(&on_proxy, progress, &mut |s| watch(&on_surface(s, surface.index, surface.mesh)))?;
-    progress.take_part(Some(ON_MESH));
-    let Some(drawing) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
+    progress.set_range(Some(ON_MESH));
+    let Some(initial_embedding) = levels.up(layout, &coarse.embedding, progress)? else { return Ok(None) };
     let steps = if surface.sharp.contains(&true) { 0 } else { FINE_STEPS };
     let settings = Settings { steps: steps.min(job.settings.steps), ..job.settings };
-    let fine = Job { drawing: &drawing, settings, ..*job };
-    let ready = Optimizer::finer_net(&fine)?;
+    let fine = Problem { initial_embedding: &initial_embedding, settings, ..*job };
+    let ready = Optimiser::finer_net(&fine)?;
     progress.check()?;
     let guess = levels.guess(&ready.0, &coarse.maps);
-    let start = match Optimizer::from_guess(&fine, ready, (&guess, FIRST_STEPS, PULL), progress)? {
+    let start = match Optimiser::from_guess(&fine, ready, (&guess, FIRST_STEPS, PULL), progress)? {
         Ok(start) => Ok(start),
-        Err(_) => Optimizer::from_drawing(&fine, progress)?,
+        Err(_) => Optimiser::from_drawing(&fine, progress)?,
     };
     let mut course = Course::going_on(&fine, &coarse.report, watch);
     let mut done = course.without_folds(&fine, Ok(start), progress)?;
@@ -130,14 +130,14 @@ struct Levels<'a> {
 
 impl Levels<'_> {
     /// The drawing of the job on the proxy.
-    fn down(&self, job: &Job<'_>, progress: &Progress) -> Result<Option<Embedding>, EmbeddingError> {
-        let drawn = (job.layout, job.drawing, self.fine.n_vertices());
+    fn down(&self, job: &Problem<'_>, progress: &Progress) -> Result<Option<Embedding>, EmbeddingError> {
+        let drawn = (job.layout, job.initial_embedding, self.fine.n_vertices());
         let place = |n: usize| {
-            let at = point(self.fine, job.drawing, job.drawing.nodes[n]);
+            let at = point(self.fine, job.initial_embedding, job.initial_embedding.nodes[n]);
             Some(self.proxy.to_proxy(self.fine, at).nearest_vertex(self.proxy.mesh()))
         };
-        let carried = |line: &Line| {
-            let found = self.proxy.line_to_proxy(self.fine, &line.points, line.closed);
+        let carried = |line: &DualCurve| {
+            let found = self.proxy.polyline_to_proxy(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be carried to the proxy")).ok()
         };
         Ok(carry(drawn, self.proxy.mesh(), carried, place, progress)?)
@@ -147,20 +147,22 @@ impl Levels<'_> {
     fn up(
         &self,
         layout: &QuadLayout,
-        drawing: &Embedding,
+        initial_embedding: &Embedding,
         progress: &Progress,
     ) -> Result<Option<Embedding>, EmbeddingError> {
-        let place = |n: usize| Some(self.original_vertex(point(self.proxy.mesh(), drawing, drawing.nodes[n])));
-        let carried = |line: &Line| {
-            let found = self.proxy.line_to_original(self.fine, &line.points, line.closed);
+        let place = |n: usize| {
+            Some(self.original_vertex(point(self.proxy.mesh(), initial_embedding, initial_embedding.nodes[n])))
+        };
+        let carried = |line: &DualCurve| {
+            let found = self.proxy.polyline_to_original(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be carried back")).ok()
         };
-        Ok(carry((layout, drawing, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
+        Ok(carry((layout, initial_embedding, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
     }
 
     /// The map of the proxy on a net on the mesh: coordinates of the corners of each triangle up to translations and quarter
     /// turns.
-    fn guess(&self, net: &Net, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
+    fn guess(&self, net: &EmbeddingTopology, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
         let mut pieces: Vec<Vec<Affine>> = vec![Vec::new(); self.proxy.mesh().n_faces()];
         for map in maps {
             for f in map.mesh.faces() {
@@ -229,8 +231,8 @@ impl Affine {
 }
 
 /// Where a vertex of a drawing lies on the mesh that it refines.
-fn point(mesh: &TriMesh, drawing: &Embedding, v: u32) -> SurfacePoint {
-    let face = FaceId(drawing.base_face[drawing.mesh.any_outgoing(v) as usize / 3]);
+fn point(mesh: &TriMesh, initial_embedding: &Embedding, v: u32) -> SurfacePoint {
+    let face = FaceId(initial_embedding.base_face[initial_embedding.mesh.vertex_halfedge(v) as usize / 3]);
     let corners = mesh.face_vertices(face).map(|v| mesh.position(v));
-    SurfacePoint { face, weights: nearest_in_triangle(drawing.mesh.positions[v as usize], &corners) }
+    SurfacePoint { face, weights: nearest_in_triangle(initial_embedding.mesh.positions[v as usize], &corners) }
 }

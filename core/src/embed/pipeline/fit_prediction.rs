@@ -6,11 +6,11 @@
 //! nodes bring it closer, and show which folds do not go away.
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::quality::{TriangleMeasure, measure_map};
 use crate::embed::parameterise::solve::{Aim, Features};
 use crate::embed::parameterise::state::State;
-use crate::embed::problem::Job;
+use crate::embed::problem::Problem;
 use crate::progress::Progress;
 use crate::surface::face_curvature;
 
@@ -19,7 +19,7 @@ const WORST: f64 = 4.0;
 
 /// What is foreseen of an embedding.
 #[derive(Debug, Clone)]
-pub struct Foreseen {
+pub struct PredictedFit {
     /// The mean deviation of the map from principal directions, in degrees, as
     /// [`Measures::alignment`](crate::embed::Measures::alignment).
     pub alignment: f64,
@@ -37,18 +37,18 @@ pub struct Foreseen {
 /// # Errors
 ///
 /// See [`EmbeddingError`].
-pub fn foresee(job: &Job<'_>, steps: usize, progress: &Progress) -> Result<Foreseen, EmbeddingError> {
-    let ready = Optimizer::net(job)?;
+pub fn predict_fit(job: &Problem<'_>, steps: usize, progress: &Progress) -> Result<PredictedFit, EmbeddingError> {
+    let ready = Optimiser::net(job)?;
     progress.check()?;
-    let mut optimizer = Optimizer::on(job, ready, (Aim::LeastSquares, Features::Pulled(1.0)), progress)?
+    let mut optimiser = Optimiser::on(job, ready, (Aim::LeastSquares, Features::Pulled(1.0)), progress)?
         .map_err(|_| EmbeddingError::Folded)?;
     for _ in 0..steps {
         progress.check()?;
-        optimizer.step(progress)?;
+        optimiser.step(progress)?;
     }
-    let State { net, solution, .. } = optimizer.state();
+    let State { net, solution, .. } = optimiser.state();
     let mesh = &net.mesh;
-    let bending = face_curvature(mesh, &optimizer.curvature, |_| true);
+    let bending = face_curvature(mesh, &optimiser.curvature, |_| true);
     let (_, triangles) = measure_map(mesh, &solution.map, &bending);
     let area: f64 = triangles.iter().map(|t| t.area).sum();
     let weight: f64 = triangles.iter().map(|t| t.area * t.anisotropy).sum();
@@ -59,15 +59,15 @@ pub fn foresee(job: &Job<'_>, steps: usize, progress: &Progress) -> Result<Fores
     for (t, base) in triangles.iter().zip(&net.base_face) {
         shares[base.index()] += t.area * t.anisotropy * t.deviation / weight;
     }
-    let folded = optimizer.state().flipped() as f64 / mesh.n_faces() as f64;
-    Ok(Foreseen { alignment: shares.iter().sum(), conformal, folded, shares })
+    let folded = optimiser.state().flipped() as f64 / mesh.n_faces() as f64;
+    Ok(PredictedFit { alignment: shares.iter().sum(), conformal, folded, shares })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::dual::Arrangement;
-    use crate::embed::{Settings, Surface, headings};
+    use crate::embed::{Settings, Surface, arc_headings};
     use crate::layout::{QuadLayout, embed};
     use crate::surface::{SurfaceCurve, SurfaceIndex, principal_curvature};
     use crate::testing::{column, diagonal, row, torus};
@@ -75,24 +75,25 @@ mod tests {
     const N: u32 = 24;
 
     /// What is foreseen of the layout of some curves on a torus.
-    fn of(curves: &[SurfaceCurve], steps: usize) -> Foreseen {
+    fn of(curves: &[SurfaceCurve], steps: usize) -> PredictedFit {
         let mesh = torus(N, N);
         let arrangement = Arrangement::new(&mesh, curves).unwrap();
         let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-        let drawing = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+        let initial_embedding =
+            embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
         let sharp = vec![false; mesh.n_edges()];
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
         let index = SurfaceIndex::new(&mesh);
-        let job = Job {
+        let job = Problem {
             surface: Surface { mesh: &mesh, index: &index, curvature: &curvature, sharp: &sharp },
             layout: &layout,
-            drawing: &drawing,
-            headings: &headings(&layout),
+            initial_embedding: &initial_embedding,
+            arc_headings: &arc_headings(&layout),
             pinned_nodes: &[],
             pinned_arcs: &[],
             settings: Settings::default(),
         };
-        let found = foresee(&job, steps, &Progress::new()).unwrap();
+        let found = predict_fit(&job, steps, &Progress::new()).unwrap();
         assert_eq!(found.shares.len(), mesh.n_faces());
         assert!((found.shares.iter().sum::<f64>() - found.alignment).abs() < 1e-12);
         found
@@ -111,7 +112,7 @@ mod tests {
         let curves =
             [row(N, 3, true, 0.4), row(N, 5, true, 0.4), column(N, N, 5, true, 0.4), column(N, N, 6, true, 0.4)];
         let [drawn, moved] = [0, 3].map(|steps| of(&curves, steps));
-        let price = |f: &Foreseen| f.alignment + 10.0 * f.conformal;
+        let price = |f: &PredictedFit| f.alignment + 10.0 * f.conformal;
         assert!(price(&moved) <= price(&drawn) + 1e-2, "{} {}", price(&moved), price(&drawn));
     }
 }

@@ -1,12 +1,12 @@
 //! Optimising the embedding of a layout, with chords collapsed where that is asked for.
 
 use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::pipeline::chord_collapse::Collapse;
 use crate::embed::pipeline::coarse_to_fine::coarse_to_fine;
 use crate::embed::pipeline::phases::Course;
 use crate::embed::pipeline::reduced_problem::Shorter;
-use crate::embed::problem::{Embedded, Job, Next, Settings, Snapshot};
+use crate::embed::problem::{Next, OptimisedEmbedding, Problem, Settings, Snapshot};
 use crate::progress::Progress;
 
 /// From where to where moving nodes brings the progress of the whole.
@@ -34,18 +34,18 @@ struct Rule {
 ///
 /// See [`EmbeddingError`].
 pub fn optimise(
-    job: &Job<'_>,
+    job: &Problem<'_>,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
-) -> Result<Embedded, EmbeddingError> {
+) -> Result<OptimisedEmbedding, EmbeddingError> {
     if let Some(done) = coarse_to_fine(job, progress, watch)? {
         return Ok(done);
     }
     progress.report("Embedding the layout", 0.0);
-    let (mut optimizer, mut course) = match Optimizer::new(job, progress) {
-        Ok(optimizer) => {
-            let course = Course::begin(job, &optimizer, watch);
-            (optimizer, course)
+    let (mut optimiser, mut course) = match Optimiser::new(job, progress) {
+        Ok(optimiser) => {
+            let course = Course::begin(job, &optimiser, watch);
+            (optimiser, course)
         }
         Err(error) => {
             let mut course = Course::new(job, watch);
@@ -54,32 +54,32 @@ pub fn optimise(
             return Ok(done);
         }
     };
-    course.rest(&mut optimizer, MOVING, progress)?;
+    course.rest(&mut optimiser, MOVING, progress)?;
     let Settings { collapse, simplify, .. } = job.settings;
     if job.layout.patches.is_empty() || (collapse.is_none() && !simplify) {
-        return course.finish(job, optimizer, progress);
+        return course.finish(job, optimiser, progress);
     }
     let mut shorter = Shorter::none(job);
-    let mut chosen = Collapse::new(job.layout, optimizer.stays());
+    let mut chosen = Collapse::new(job.layout, optimiser.stays());
     let one_by_one = Rule { least: f64::INFINITY, worse: 1.0, most: 1, simpler: true };
     let shortest = collapse.map(|least| Rule { least, worse: WORSE, most: job.layout.chords, simpler: false });
     for mut rule in shortest.into_iter().chain(simplify.then_some(one_by_one)) {
         while course.next == Next::Continue {
-            let short = shorter.numbers(optimizer.short_chords(rule.least));
+            let short = shorter.numbers(optimiser.short_chords(rule.least));
             let before = chosen.done.len();
             let count = chosen.choose(short, rule.most, rule.simpler);
             if count == 0 {
                 break;
             }
-            let most = rule.worse * optimizer.state().solution.energy;
+            let most = rule.worse * optimiser.state().solution.energy;
             let tried = chosen.draw(job, progress).map_err(|error| error.to_string());
             progress.check()?;
             let problem = match tried {
                 Ok(redrawn) => {
                     shorter = Shorter::new(job, redrawn);
-                    optimizer = Optimizer::new(&shorter.job(job), progress)?;
-                    course.rest(&mut optimizer, MOVING, progress)?;
-                    let energy = optimizer.state().solution.energy;
+                    optimiser = Optimiser::new(&shorter.job(job), progress)?;
+                    course.rest(&mut optimiser, MOVING, progress)?;
+                    let energy = optimiser.state().solution.energy;
                     tracing::debug!(gone = chosen.done.len(), energy, most, "chords collapsed");
                     (energy > most)
                         .then(|| format!("the energy would be {:.2} of what it is", rule.worse * energy / most))
@@ -94,15 +94,15 @@ pub fn optimise(
                     0 => Shorter::none(job),
                     _ => Shorter::new(job, chosen.draw(job, progress)?),
                 };
-                optimizer = Optimizer::new(&shorter.job(job), progress)?;
-                course.rest(&mut optimizer, MOVING, progress)?;
+                optimiser = Optimiser::new(&shorter.job(job), progress)?;
+                course.rest(&mut optimiser, MOVING, progress)?;
             } else {
-                course.show(&optimizer);
+                course.show(&optimiser);
             }
         }
     }
-    let mut done = course.finish(&shorter.job(job), optimizer, progress)?;
+    let mut done = course.finish(&shorter.job(job), optimiser, progress)?;
     (done.report.collapsed, done.report.short) = (chosen.done, chosen.kept);
-    done.drawing = shorter.redrawn.map(|r| r.embedding);
+    done.initial_embedding = shorter.redrawn.map(|r| r.embedding);
     Ok(done)
 }

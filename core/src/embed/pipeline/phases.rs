@@ -5,15 +5,15 @@
 
 use crate::embed::EmbeddingError;
 use crate::embed::map_rectangles;
-use crate::embed::optimise::optimiser::Optimizer;
+use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::quality::measure_patches;
 use crate::embed::parameterise::solve::Folded;
 use crate::embed::parameterise::state::State;
-use crate::embed::problem::{Embedded, EmbeddingReport, Job, Next, RemainingFold, Settings, Snapshot};
-use crate::embed::trace::arcs::{Folds, trace_arcs};
-use crate::embed::trace::completion::emerge;
+use crate::embed::problem::{EmbeddingReport, Next, OptimisedEmbedding, Problem, RemainingFlip, Settings, Snapshot};
+use crate::embed::trace::arcs::{FlippedTriangles, trace_arcs};
+use crate::embed::trace::completion::complete_layout;
 use crate::mesh::FaceId;
-use crate::param::{Fold, FoldReason};
+use crate::param::{FlipReason, FlippedTriangle};
 use crate::progress::Progress;
 
 /// How far the isolines that complete a partial layout are followed, in square roots of the surface's area: many times
@@ -33,26 +33,26 @@ pub(in crate::embed) struct Course<'w> {
 }
 
 impl<'w> Course<'w> {
-    pub(in crate::embed) fn new(job: &Job<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
+    pub(in crate::embed) fn new(job: &Problem<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
         let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
         Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0, first: None }
     }
 
     pub(in crate::embed) fn begin(
-        job: &Job<'_>,
-        optimizer: &Optimizer<'_>,
+        job: &Problem<'_>,
+        optimiser: &Optimiser<'_>,
         watch: &'w mut dyn FnMut(&Snapshot) -> Next,
     ) -> Self {
         let mut course = Self::new(job, watch);
-        course.energy_before = optimizer.state().solution.energy / course.area;
-        course.flipped_before = optimizer.state().flipped();
-        course.show(optimizer);
+        course.energy_before = optimiser.state().solution.energy / course.area;
+        course.flipped_before = optimiser.state().flipped();
+        course.show(optimiser);
         course
     }
 
     /// The course that goes on on another mesh.
     pub(in crate::embed) fn going_on(
-        job: &Job<'_>,
+        job: &Problem<'_>,
         report: &EmbeddingReport,
         watch: &'w mut dyn FnMut(&Snapshot) -> Next,
     ) -> Self {
@@ -60,8 +60,8 @@ impl<'w> Course<'w> {
         Self { steps, energy_before, flipped_before, ..Self::new(job, watch) }
     }
 
-    pub(in crate::embed) fn show(&mut self, optimizer: &Optimizer<'_>) {
-        let state = optimizer.state();
+    pub(in crate::embed) fn show(&mut self, optimiser: &Optimiser<'_>) {
+        let state = optimiser.state();
         let first = *self.first.get_or_insert(state.solution.energy);
         self.next = (self.watch)(&state.snapshot(self.steps, first));
     }
@@ -69,16 +69,16 @@ impl<'w> Course<'w> {
     /// Moves the nodes until they rest, which is a part of the whole work.
     pub(in crate::embed) fn rest(
         &mut self,
-        optimizer: &mut Optimizer<'_>,
+        optimiser: &mut Optimiser<'_>,
         (from, to): (f64, f64),
         progress: &Progress,
     ) -> Result<(), EmbeddingError> {
-        while self.next == Next::Continue && !optimizer.is_done() && !optimizer.is_hopeless() {
-            progress.report("Moving nodes", from + (to - from) * optimizer.share_done());
-            let better = optimizer.step(progress)?;
+        while self.next == Next::Continue && !optimiser.is_done() && !optimiser.is_hopeless() {
+            progress.report("Moving nodes", from + (to - from) * optimiser.share_done());
+            let better = optimiser.step(progress)?;
             self.steps += 1;
             if better {
-                self.show(optimizer);
+                self.show(optimiser);
             }
         }
         Ok(())
@@ -87,25 +87,25 @@ impl<'w> Course<'w> {
     /// From nodes at rest to the finished embedding.
     pub(in crate::embed) fn finish(
         mut self,
-        job: &Job<'_>,
-        mut optimizer: Optimizer<'_>,
+        job: &Problem<'_>,
+        mut optimiser: Optimiser<'_>,
         progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
-        let flipped_at_rest = optimizer.state().flipped();
+    ) -> Result<OptimisedEmbedding, EmbeddingError> {
+        let flipped_at_rest = optimiser.state().flipped();
         let Settings { integer, .. } = job.settings;
         let complete = !job.layout.patches.is_empty();
-        let found = if optimizer.is_hopeless() && complete && integer.is_none() {
+        let found = if optimiser.is_hopeless() && complete && integer.is_none() {
             Err(EmbeddingError::Folded)
         } else {
-            self.least_squares(job, &mut optimizer, progress)
+            self.least_squares(job, &mut optimiser, progress)
         };
-        let is_whole = |done: &Embedded| done.report.folds.is_empty();
+        let is_whole = |done: &OptimisedEmbedding| done.report.folds.is_empty();
         let mut done = match found {
             Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
             // Nodes that move on would leave the grid.
             Ok(done) if !complete || (integer.is_some() && is_whole(&done)) => done,
             found => {
-                let start = Optimizer::from_map(job, optimizer.into_parts(), progress);
+                let start = Optimiser::from_map(job, optimiser.into_parts(), progress);
                 match (self.without_folds(job, start, progress), found) {
                     (Ok(done), _) => done,
                     (Err(EmbeddingError::Cancelled(cancelled)), _) => return Err(cancelled.into()),
@@ -125,29 +125,29 @@ impl<'w> Course<'w> {
     /// The embedding that least squares lead to, with the folds that cannot be removed from it.
     fn least_squares(
         &mut self,
-        job: &Job<'_>,
-        optimizer: &mut Optimizer<'_>,
+        job: &Problem<'_>,
+        optimiser: &mut Optimiser<'_>,
         progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
+    ) -> Result<OptimisedEmbedding, EmbeddingError> {
         if let Some(edge) = job.settings.integer {
             progress.report("Rounding lengths", 0.35);
-            optimizer.round(edge, progress)?;
-            self.show(optimizer);
-            self.rest(optimizer, (0.35, 0.4), progress)?;
+            optimiser.round(edge, progress)?;
+            self.show(optimiser);
+            self.rest(optimiser, (0.35, 0.4), progress)?;
         }
         progress.report("Removing folds", 0.4);
-        let folds = optimizer.finish(progress)?;
-        finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)
+        let folds = optimiser.finish(progress)?;
+        finished(job, (optimiser.state(), &optimiser.sharp), &folds, self.area, progress)
     }
 
     /// The embedding without folds that the drawing leads to; if there is none, what was found before.
     pub(in crate::embed) fn drawing_unfolded(
         &mut self,
-        job: &Job<'_>,
-        found: Result<Embedded, EmbeddingError>,
+        job: &Problem<'_>,
+        found: Result<OptimisedEmbedding, EmbeddingError>,
         progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
-        let start = Optimizer::from_drawing(job, progress);
+    ) -> Result<OptimisedEmbedding, EmbeddingError> {
+        let start = Optimiser::from_drawing(job, progress);
         self.without_folds(job, start, progress).or_else(|error| match error {
             EmbeddingError::Cancelled(_) => Err(error),
             _ => found,
@@ -163,30 +163,30 @@ impl<'w> Course<'w> {
     /// Moves the nodes with a map that never folds.
     pub(in crate::embed) fn without_folds(
         &mut self,
-        job: &Job<'_>,
-        start: Result<Result<Optimizer<'_>, Folded>, EmbeddingError>,
+        job: &Problem<'_>,
+        start: Result<Result<Optimiser<'_>, Folded>, EmbeddingError>,
         progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
-        let mut optimizer = start?.map_err(|_| EmbeddingError::Folded)?;
+    ) -> Result<OptimisedEmbedding, EmbeddingError> {
+        let mut optimiser = start?.map_err(|_| EmbeddingError::Folded)?;
         self.first = None;
-        self.show(&optimizer);
-        let safe = optimizer.state().clone();
-        optimizer.release(job);
-        self.rest(&mut optimizer, (0.5, 0.8), progress)?;
+        self.show(&optimiser);
+        let safe = optimiser.state().clone();
+        optimiser.release(job);
+        self.rest(&mut optimiser, (0.5, 0.8), progress)?;
         progress.report("Moving nodes", 0.8);
-        match self.held(job, &mut optimizer, progress) {
+        match self.held(job, &mut optimiser, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes that were released cannot be held: they move held");
-                optimizer.begin_held(safe.clone());
-                self.show(&optimizer);
+                optimiser.begin_held(safe.clone());
+                self.show(&optimiser);
             }
             done => return done,
         }
-        self.rest(&mut optimizer, (0.8, 0.85), progress)?;
-        match self.held(job, &mut optimizer, progress) {
+        self.rest(&mut optimiser, (0.8, 0.85), progress)?;
+        match self.held(job, &mut optimiser, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
                 tracing::debug!(%error, "nodes stay where they were");
-                finished(job, (&safe, &optimizer.sharp), &[], self.area, progress)
+                finished(job, (&safe, &optimiser.sharp), &[], self.area, progress)
             }
             done => done,
         }
@@ -195,28 +195,28 @@ impl<'w> Course<'w> {
     /// The embedding with all nodes held on their isolines.
     fn held(
         &self,
-        job: &Job<'_>,
-        optimizer: &mut Optimizer<'_>,
+        job: &Problem<'_>,
+        optimiser: &mut Optimiser<'_>,
         progress: &Progress,
-    ) -> Result<Embedded, EmbeddingError> {
-        let folds = optimizer.finish(progress)?;
-        finished(job, (optimizer.state(), &optimizer.sharp), &folds, self.area, progress)
+    ) -> Result<OptimisedEmbedding, EmbeddingError> {
+        let folds = optimiser.finish(progress)?;
+        finished(job, (optimiser.state(), &optimiser.sharp), &folds, self.area, progress)
     }
 }
 
 /// Arcs and patches of a map that is done. The report lacks what happened before.
 fn finished(
-    job: &Job<'_>,
+    job: &Problem<'_>,
     (state, sharp): (&State, &[bool]),
-    folds: &[Fold],
+    folds: &[FlippedTriangle],
     area: f64,
     progress: &Progress,
-) -> Result<Embedded, EmbeddingError> {
+) -> Result<OptimisedEmbedding, EmbeddingError> {
     progress.report("Tracing arcs", 0.9);
-    let strict = if folds.is_empty() { Folds::Refuse } else { Folds::Cross };
+    let strict = if folds.is_empty() { FlippedTriangles::Refuse } else { FlippedTriangles::Cross };
     let (mesh, map) = (&state.net.mesh, &state.solution.map);
     let (layout, traced) = if job.layout.patches.is_empty() {
-        let emerged = emerge(mesh, map, &state.vertices(), LONGEST * area.sqrt())?;
+        let emerged = complete_layout(mesh, map, &state.vertices(), LONGEST * area.sqrt())?;
         (emerged.layout, emerged.traced)
     } else {
         (job.layout.clone(), trace_arcs(mesh, map, job.layout, &state.vertices(), &state.chains(), strict)?)
@@ -234,12 +234,12 @@ fn finished(
         let corners = mesh.face_vertices(FaceId(f)).map(|v| mesh.position(v));
         ((corners[0] + corners[1] + corners[2]) / 3.0).to_array()
     };
-    let reason = |r: FoldReason| match r {
-        FoldReason::HighValence { quarters, triangles, .. } => {
+    let reason = |r: FlipReason| match r {
+        FlipReason::HighValence { quarters, triangles, .. } => {
             format!("{triangles} triangles cannot span the {quarters} quarter turns around their node")
         }
-        FoldReason::Fixed => "the constraints leave it no choice".to_owned(),
-        FoldReason::NotResolved => "no map without this fold was found".to_owned(),
+        FlipReason::Fixed => "the constraints leave it no choice".to_owned(),
+        FlipReason::NotResolved => "no map without this fold was found".to_owned(),
     };
     let report = EmbeddingReport {
         steps: 0,
@@ -247,11 +247,11 @@ fn finished(
         energy_after: state.least_squares() / area,
         flipped_before: 0,
         flipped_at_rest: 0,
-        folds: folds.iter().map(|f| RemainingFold { at: place(f.triangle), reason: reason(f.reason) }).collect(),
+        folds: folds.iter().map(|f| RemainingFlip { at: place(f.triangle), reason: reason(f.reason) }).collect(),
         collapsed: Vec::new(),
         short: Vec::new(),
         features: state.features(sharp),
         measures,
     };
-    Ok(Embedded { layout, embedding, maps, drawing: None, report })
+    Ok(OptimisedEmbedding { layout, embedding, maps, initial_embedding: None, report })
 }

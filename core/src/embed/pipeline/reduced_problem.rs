@@ -1,30 +1,30 @@
 //! A job whose layout has lost chords.
 
-use crate::embed::headings;
-use crate::embed::problem::Job;
-use crate::embed::topology::embedding_topology::Headings;
-use crate::layout::Redrawn;
+use crate::embed::arc_headings;
+use crate::embed::problem::Problem;
+use crate::embed::topology::embedding_topology::ArcHeadings;
+use crate::layout::Reembedded;
 
 /// What is left of a job's layout without the chords that were collapsed.
 pub(in crate::embed) struct Shorter {
     /// `None` as long as none was.
-    pub redrawn: Option<Redrawn>,
-    headings: Vec<Headings>,
+    pub redrawn: Option<Reembedded>,
+    arc_headings: Vec<ArcHeadings>,
     pinned_nodes: Vec<bool>,
     pinned_arcs: Vec<bool>,
 }
 
 impl Shorter {
-    pub(in crate::embed) fn none(job: &Job<'_>) -> Self {
+    pub(in crate::embed) fn none(job: &Problem<'_>) -> Self {
         Self {
             redrawn: None,
-            headings: job.headings.to_vec(),
+            arc_headings: job.arc_headings.to_vec(),
             pinned_nodes: job.pinned_nodes.to_vec(),
             pinned_arcs: job.pinned_arcs.to_vec(),
         }
     }
 
-    pub(in crate::embed) fn new(job: &Job<'_>, redrawn: Redrawn) -> Self {
+    pub(in crate::embed) fn new(job: &Problem<'_>, redrawn: Reembedded) -> Self {
         let mut pinned_nodes = vec![false; redrawn.layout.nodes.len()];
         for (&new, _) in redrawn.nodes.iter().zip(job.pinned_nodes).filter(|pair| *pair.1) {
             pinned_nodes[new as usize] = true;
@@ -33,13 +33,14 @@ impl Shorter {
         for (new, _) in redrawn.arcs.iter().zip(job.pinned_arcs).filter(|pair| *pair.1) {
             new.iter().for_each(|&a| pinned_arcs[a as usize] = true);
         }
-        Self { headings: headings(&redrawn.layout), pinned_nodes, pinned_arcs, redrawn: Some(redrawn) }
+        Self { arc_headings: arc_headings(&redrawn.layout), pinned_nodes, pinned_arcs, redrawn: Some(redrawn) }
     }
 
-    pub(in crate::embed) fn job<'s>(&'s self, job: &Job<'s>) -> Job<'s> {
-        let (layout, drawing) = self.redrawn.as_ref().map_or((job.layout, job.drawing), |r| (&r.layout, &r.embedding));
-        let Self { headings, pinned_nodes, pinned_arcs, .. } = self;
-        Job { layout, drawing, headings, pinned_nodes, pinned_arcs, ..*job }
+    pub(in crate::embed) fn job<'s>(&'s self, job: &Problem<'s>) -> Problem<'s> {
+        let (layout, initial_embedding) =
+            self.redrawn.as_ref().map_or((job.layout, job.initial_embedding), |r| (&r.layout, &r.embedding));
+        let Self { arc_headings, pinned_nodes, pinned_arcs, .. } = self;
+        Problem { layout, initial_embedding, arc_headings, pinned_nodes, pinned_arcs, ..*job }
     }
 
     /// The same chords, by their numbers in the layout that was given.

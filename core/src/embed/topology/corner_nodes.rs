@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use crate::embed::topology::embedding_topology::Net;
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
 /// How far a node is fetched, as a fraction of the bounding-box diagonal: farther ones belong to other parts.
@@ -19,7 +19,11 @@ const REACH: f64 = 0.2;
 const STRAIGHT: f64 = -std::f64::consts::FRAC_1_SQRT_2;
 
 /// Brings nodes to the corners of features that are theirs; `held` nodes stay.
-pub(in crate::embed) fn snap(net: &mut Net, sharp: &[bool], held: impl Fn(usize) -> bool) {
+pub(in crate::embed) fn move_nodes_to_corners(
+    net: &mut EmbeddingTopology,
+    sharp: &[bool],
+    held: impl Fn(usize) -> bool,
+) {
     let corners = corners(&net.mesh, sharp);
     let mut pairs: Vec<(f64, usize, VertexId)> = Vec::new();
     for &(corner, valence) in &corners {
@@ -34,7 +38,9 @@ pub(in crate::embed) fn snap(net: &mut Net, sharp: &[bool], held: impl Fn(usize)
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut done = vec![false; net.nodes.len()];
     for (_, node, corner) in pairs {
-        let taken = |net: &Net, v: VertexId| net.nodes.iter().enumerate().any(|(i, n)| i != node && n.vertex == v);
+        let taken = |net: &EmbeddingTopology, v: VertexId| {
+            net.nodes.iter().enumerate().any(|(i, n)| i != node && n.vertex == v)
+        };
         if done[node] || taken(net, corner) || net.nodes.iter().zip(&done).any(|(n, &d)| d && n.vertex == corner) {
             continue;
         }
@@ -49,7 +55,7 @@ pub(in crate::embed) fn snap(net: &mut Net, sharp: &[bool], held: impl Fn(usize)
         }
         if at == corner {
             for h in path {
-                net.move_along(node, h);
+                net.move_node(node, h);
             }
             done[node] = true;
         }

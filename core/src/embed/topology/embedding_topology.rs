@@ -21,7 +21,7 @@ use crate::surface::Metric;
 
 /// A node of the layout on the mesh.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NetNode {
+pub struct TopologyNode {
     /// Its vertex.
     pub vertex: VertexId,
     /// Number of quarters (patch corners) around it.
@@ -30,7 +30,7 @@ pub struct NetNode {
     pub boundary: bool,
 }
 
-impl NetNode {
+impl TopologyNode {
     /// Whether the field is regular there.
     pub fn is_regular(&self) -> bool {
         self.index() == 0
@@ -44,7 +44,7 @@ impl NetNode {
 
 /// An arc as a chain of triangles.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NetArc {
+pub struct TopologyArc {
     /// The two nodes.
     pub nodes: [u32; 2],
     /// The corner it starts at: a half-edge whose origin is the first node, in the chain's first triangle.
@@ -61,7 +61,7 @@ pub struct NetArc {
 
 /// A layout on a mesh, up to homotopy.
 #[derive(Debug, Clone)]
-pub struct Net {
+pub struct EmbeddingTopology {
     /// The mesh, with a vertex for every node.
     pub mesh: TriMesh,
     /// Triangle of the surface that each triangle lies in.
@@ -71,19 +71,19 @@ pub struct Net {
     /// Direction 0 of each triangle's cross in the rough drawing, from half-edge 0: a guess only.
     pub angle: Vec<f64>,
     /// The nodes, as in the layout.
-    pub nodes: Vec<NetNode>,
+    pub nodes: Vec<TopologyNode>,
     /// The arcs, as in the layout.
-    pub arcs: Vec<NetArc>,
+    pub arcs: Vec<TopologyArc>,
     /// For each boundary half-edge the direction of its triangle's cross that runs along it, and its arc.
     pub boundary: HashMap<HalfedgeId, (u8, u32)>,
 }
 
 /// The headings of an arc's two sides: in the region to its left when it is run through forward, and in the one to
 /// its left backward.
-pub type Headings = [Option<u8>; 2];
+pub type ArcHeadings = [Option<u8>; 2];
 
 /// The headings of the arcs of a complete layout: every patch is its own chart, its side `i` heading along `i`.
-pub fn headings(layout: &QuadLayout) -> Vec<Headings> {
+pub fn arc_headings(layout: &QuadLayout) -> Vec<ArcHeadings> {
     let mut of = vec![[None; 2]; layout.arcs.len()];
     for patch in &layout.patches {
         for (i, &(arc, forward)) in patch.sides.iter().enumerate() {
@@ -93,7 +93,7 @@ pub fn headings(layout: &QuadLayout) -> Vec<Headings> {
     of
 }
 
-impl Net {
+impl EmbeddingTopology {
     /// Transfers a drawn layout to the triangles of `surface`.
     ///
     /// # Errors
@@ -103,21 +103,21 @@ impl Net {
         surface: &TriMesh,
         embedding: &Embedding,
         layout: &QuadLayout,
-        headings: &[Headings],
+        arc_headings: &[ArcHeadings],
     ) -> Result<Self, EmbeddingError> {
         let working = Working::new(surface, embedding)?;
-        let charts = Charts::new(&working, headings);
+        let charts = Charts::new(&working, arc_headings);
         let arcs = (0..layout.arcs.len())
             .map(|a| charts.arc(&working, layout, a).ok_or(EmbeddingError::Arc { arc: a }))
             .collect::<Result<_, _>>()?;
         let jump = charts.jumps(&working)?;
         let boundary = charts.boundary(&working);
         let guides = charts.directions(&working);
-        let nodes: Vec<NetNode> = working
+        let nodes: Vec<TopologyNode> = working
             .nodes
             .iter()
             .zip(&layout.nodes)
-            .map(|(&vertex, n)| NetNode { vertex, valence: n.valence, boundary: n.boundary })
+            .map(|(&vertex, n)| TopologyNode { vertex, valence: n.valence, boundary: n.boundary })
             .collect();
         let Working { mesh, base_face, .. } = working;
         let metric = Metric::new(&mesh);
@@ -159,13 +159,13 @@ struct Charts {
     /// triangle it lies in.
     frame: Vec<i32>,
     /// Headings of the arcs' sides.
-    headings: Vec<Headings>,
+    arc_headings: Vec<ArcHeadings>,
     /// Arc and sense of each marked half-edge of the drawing.
     along: HashMap<u32, (u32, bool)>,
 }
 
 impl Charts {
-    fn new(working: &Working, headings: &[Headings]) -> Self {
+    fn new(working: &Working, arc_headings: &[ArcHeadings]) -> Self {
         let drawing = &working.drawing;
         let mut along = HashMap::new();
         for (a, path) in working.arcs.iter().enumerate() {
@@ -176,7 +176,7 @@ impl Charts {
                 }
             }
         }
-        let mut charts = Self { frame: vec![i32::MIN; drawing.n_faces()], headings: headings.to_vec(), along };
+        let mut charts = Self { frame: vec![i32::MIN; drawing.n_faces()], arc_headings: arc_headings.to_vec(), along };
         // One face of each working triangle speaks for it; the frames of the others follow from it.
         for seed in 0..drawing.n_faces() as u32 {
             if charts.frame[seed as usize] != i32::MIN {
@@ -201,7 +201,7 @@ impl Charts {
     /// The heading of a marked half-edge in the region to its left.
     fn heading(&self, h: u32) -> Option<i32> {
         let &(arc, forward) = self.along.get(&h)?;
-        self.headings[arc as usize][usize::from(!forward)].map(i32::from)
+        self.arc_headings[arc as usize][usize::from(!forward)].map(i32::from)
     }
 
     /// The jump between the region charts on both sides of a half-edge of the drawing, from its own to its twin's.
@@ -240,10 +240,10 @@ impl Charts {
     }
 
     /// The chain of an arc, to the left of its path where that lies on the surface, else to its right.
-    fn arc(&self, working: &Working, layout: &QuadLayout, a: usize) -> Option<NetArc> {
+    fn arc(&self, working: &Working, layout: &QuadLayout, a: usize) -> Option<TopologyArc> {
         let arc = &layout.arcs[a];
         let mut path = working.arcs[a].clone();
-        let backward = self.headings[a][0].is_none();
+        let backward = self.arc_headings[a][0].is_none();
         if backward {
             path.reverse();
         }
@@ -265,10 +265,10 @@ impl Charts {
         Some(if backward {
             let crossed = crossed.iter().rev().map(|&h| working.mesh.twin(h)).collect::<Option<_>>()?;
             let (start, end) = (corner(tail, nodes[0])?, corner(head, nodes[1])?);
-            NetArc { nodes, start, crossed, end, heading: (heading(tail)? + 2) % 4, boundary }
+            TopologyArc { nodes, start, crossed, end, heading: (heading(tail)? + 2) % 4, boundary }
         } else {
             let (start, end) = (corner(head, nodes[0])?, corner(tail, nodes[1])?);
-            NetArc { nodes, start, crossed, end, heading: heading(head)?, boundary }
+            TopologyArc { nodes, start, crossed, end, heading: heading(head)?, boundary }
         })
     }
 

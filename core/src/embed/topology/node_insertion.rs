@@ -152,7 +152,7 @@ impl Inserter<'_> {
         for c in corners.into_iter().filter(|&c| !on_edge(c)) {
             let path = self
                 .drawing
-                .draw(
+                .insert_path(
                     (x, self.drawn[c as usize]),
                     SPOKE,
                     |m, face| m.tag[face as usize] == f,

@@ -9,7 +9,7 @@
 //!
 //! A node on the boundary moves along it. There no jump changes, but the edge now belongs to the arc behind the node.
 
-use crate::embed::topology::embedding_topology::{Net, NetArc};
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
 use crate::embed::topology::period_jumps;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
@@ -37,9 +37,9 @@ impl Fan {
     }
 }
 
-impl Net {
+impl EmbeddingTopology {
     /// Moves a node along the edge of `h`, which leaves its vertex or, on the boundary, may also lead to it.
-    pub(in crate::embed) fn move_along(&mut self, node: usize, h: HalfedgeId) {
+    pub(in crate::embed) fn move_node(&mut self, node: usize, h: HalfedgeId) {
         let from = self.nodes[node].vertex;
         let forward = self.mesh.origin(h) == from;
         let to = if forward { self.mesh.target(h) } else { self.mesh.origin(h) };
@@ -110,7 +110,7 @@ impl Net {
     }
 }
 
-fn drag_start(mesh: &TriMesh, jump: &[i32], arc: &mut NetArc, fan: &Fan) {
+fn drag_start(mesh: &TriMesh, jump: &[i32], arc: &mut TopologyArc, fan: &Fan) {
     let mut crossed = fan.crossed(mesh, arc.start);
     let turns: i32 =
         crossed.iter().map(|&h| crate::embed::topology::embedding_topology::jump_across(mesh, jump, h)).sum();
@@ -152,7 +152,7 @@ mod tests {
                 continue;
             }
             let old = indices(&net.mesh, &net.jump);
-            net.move_along(node, h);
+            net.move_node(node, h);
             let new = indices(&net.mesh, &net.jump);
             assert_eq!(new[w.index()], old[w.index()] + 1);
             assert_eq!(new[v.index()], old[v.index()] - 1);
@@ -166,12 +166,12 @@ mod tests {
         let mut net = net();
         let before = net.clone();
         let h = net.mesh.outgoing(net.nodes[0].vertex).nth(2).unwrap();
-        net.move_along(0, h);
-        net.move_along(0, net.mesh.twin(h).unwrap());
+        net.move_node(0, h);
+        net.move_node(0, net.mesh.twin(h).unwrap());
         assert_eq!((&net.jump, &net.nodes), (&before.jump, &before.nodes));
         for (a, b) in net.arcs.iter().zip(&before.arcs) {
             // A chain may start in another triangle of the node; what it says of the end is the same.
-            let end = |net: &crate::embed::Net, arc: &crate::embed::NetArc| {
+            let end = |net: &crate::embed::EmbeddingTopology, arc: &crate::embed::TopologyArc| {
                 let turns: i32 = arc.crossed.iter().map(|&h| net.jump_across(h)).sum();
                 (i32::from(arc.heading) - turns).rem_euclid(4)
             };

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use glam::DVec3;
 
 use crate::embed::EmbeddingError;
-use crate::embed::topology::embedding_topology::{Net, NetArc};
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
 use crate::embed::topology::period_jumps;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
@@ -44,14 +44,14 @@ pub(in crate::embed) struct Carried<T> {
     pub at_vertex: Vec<T>,
 }
 
-impl Net {
+impl EmbeddingTopology {
     /// The net with finer triangles around its irregular nodes, for a field of the angles given; `None` if there is none
     /// to be refined.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub(in crate::embed) fn finer_at_nodes<T: Copy>(
+    pub(in crate::embed) fn refine_at_irregular_nodes<T: Copy>(
         &self,
         angle: &[f64],
         sharp: &[bool],
@@ -126,7 +126,7 @@ impl Net {
 }
 
 /// The edges of the triangles around irregular nodes.
-fn around_nodes(net: &Net) -> Vec<bool> {
+fn around_nodes(net: &EmbeddingTopology) -> Vec<bool> {
     let mesh = &net.mesh;
     let mut near = vec![false; mesh.n_vertices()];
     for n in net.nodes.iter().filter(|n| !n.is_regular()) {
@@ -149,7 +149,7 @@ fn around_nodes(net: &Net) -> Vec<bool> {
 }
 
 /// The edges across from irregular nodes that have fewer triangles than they need.
-fn link_of_nodes(net: &Net) -> Vec<bool> {
+fn link_of_nodes(net: &EmbeddingTopology) -> Vec<bool> {
     let mesh = &net.mesh;
     let mut marks = vec![false; mesh.n_edges()];
     for n in net.nodes.iter().filter(|n| !n.is_regular()) {
@@ -190,7 +190,7 @@ impl Refined {
     }
 
     /// The chain of an arc through the parts of its triangles.
-    fn chain(&self, coarse: &TriMesh, arc: &NetArc) -> Option<NetArc> {
+    fn chain(&self, coarse: &TriMesh, arc: &TopologyArc) -> Option<TopologyArc> {
         let (first, last) = (coarse.origin(arc.start), coarse.origin(arc.end));
         let (mut at, start) = self.corner(self.parts_of(coarse.face(arc.start)), first)?;
         // Any part of the first triangle at the node may be the first.
@@ -207,7 +207,7 @@ impl Refined {
         crossed.extend(self.walk(at, at_last)?);
         at = self.after(at, &crossed);
         let end = self.corner([at], last)?.1;
-        Some(NetArc { start, crossed, end, ..arc.clone() })
+        Some(TopologyArc { start, crossed, end, ..arc.clone() })
     }
 
     /// The triangle one is in after crossing half-edges, or `at` if there are none.
@@ -293,7 +293,7 @@ mod tests {
         let net = net();
         let sharp: Vec<bool> = net.mesh.edges().map(|e| e.0 % 3 == 0).collect();
         let mark: Vec<u32> = (0..net.mesh.n_vertices() as u32).collect();
-        let (fine, carried) = net.finer_at_nodes(&net.angle, &sharp, &mark).unwrap().unwrap();
+        let (fine, carried) = net.refine_at_irregular_nodes(&net.angle, &sharp, &mark).unwrap().unwrap();
         assert!(fine.mesh.n_faces() > net.mesh.n_faces());
         assert_eq!(fine.mesh.euler_characteristic(), net.mesh.euler_characteristic());
 
@@ -342,6 +342,6 @@ mod tests {
         let mut net = net();
         net.nodes.iter_mut().for_each(|n| n.valence = 4);
         let (sharp, mark) = (vec![false; net.mesh.n_edges()], vec![(); net.mesh.n_vertices()]);
-        assert!(net.finer_at_nodes(&net.angle, &sharp, &mark).unwrap().is_none());
+        assert!(net.refine_at_irregular_nodes(&net.angle, &sharp, &mark).unwrap().is_none());
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use crate::dual::Arrangement;
-use crate::embed::Net;
-use crate::embed::headings;
+use crate::embed::EmbeddingTopology;
+use crate::embed::arc_headings;
 use crate::embed::topology::period_jumps::vertex_index;
 use crate::layout::{QuadLayout, embed};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
@@ -14,14 +14,14 @@ use crate::testing::{column, row, torus};
 
 /// A layout of two by two patches on a torus, whose first node is given the index of a node of valence 3 and whose
 /// second that of one of valence 5, with jumps along edges from one to the other.
-pub fn net() -> Net {
+pub fn net() -> EmbeddingTopology {
     let mesh = torus(24, 12);
     let mut curves = vec![row(24, 1, true, 0.4), row(24, 7, true, 0.4)];
     curves.extend([3, 14].map(|i| column(24, 12, i, true, 0.6)));
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-    let drawing = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
-    let mut net = Net::new(&mesh, &drawing, &layout, &headings(&layout)).unwrap();
+    let initial_embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+    let mut net = EmbeddingTopology::new(&mesh, &initial_embedding, &layout, &arc_headings(&layout)).unwrap();
     for (node, valence) in [(0, 3), (1, 5)] {
         net.nodes[node].valence = valence;
     }
@@ -62,7 +62,7 @@ pub fn indices(mesh: &TriMesh, jump: &[i32]) -> Vec<i32> {
 }
 
 /// Whether the chain of an arc leads without a gap from its first node to its last.
-pub fn is_chain(net: &Net, arc: usize) -> bool {
+pub fn is_chain(net: &EmbeddingTopology, arc: usize) -> bool {
     let a = &net.arcs[arc];
     let mut face = net.mesh.face(a.start);
     let joined = a.crossed.iter().all(|&h| {

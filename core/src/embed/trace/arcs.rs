@@ -7,8 +7,8 @@ use glam::DVec3;
 use thiserror::Error;
 
 use crate::embed::trace::isolines::{Isolines, Step, direction, exactness, nodes_at};
-use crate::embed::trace::overlay::{Meeting, Point, weld};
-use crate::embed::trace::separatrix_matching::{LENGTH, Rose, Run};
+use crate::embed::trace::overlay::{Meeting, Point, overlay};
+use crate::embed::trace::separatrix_matching::{LENGTH, Run, SeparatrixMatching};
 use crate::layout::{Embedding, QuadLayout};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
 use crate::param::SeamlessMap;
@@ -111,7 +111,7 @@ pub enum TraceError {
 
 /// A layout traced in a map.
 #[derive(Debug, Clone)]
-pub struct Traced {
+pub struct TracedLayout {
     /// The layout on the refined surface.
     pub embedding: Embedding,
     /// The refined surface.
@@ -122,7 +122,7 @@ pub struct Traced {
 
 /// What to do about triangles that the map turns over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Folds {
+pub enum FlippedTriangles {
     /// An arc that meets one is an error.
     Refuse,
     /// Arcs go through them. They are isolines all the same, which part the surface into the patches as they should
@@ -141,11 +141,12 @@ pub fn trace_arcs(
     layout: &QuadLayout,
     node_vertex: &[VertexId],
     chains: &[ArcChain],
-    folds: Folds,
-) -> Result<Traced, TraceError> {
+    folds: FlippedTriangles,
+) -> Result<TracedLayout, TraceError> {
     let node = nodes_at(mesh, node_vertex);
-    let lines = Isolines { mesh, map, node: &node, exact: exactness(map), through_folds: folds == Folds::Cross };
-    let marched = Rose::new(&lines, layout, node_vertex, chains)?.arcs()?;
+    let lines =
+        Isolines { mesh, map, node: &node, exact: exactness(map), through_folds: folds == FlippedTriangles::Cross };
+    let marched = SeparatrixMatching::new(&lines, layout, node_vertex, chains)?.arcs()?;
     let mut exact = map.clone();
     for (line, _) in &marched {
         straighten(&lines, &mut exact, &line.steps[1..line.steps.len() - 1]);
@@ -163,7 +164,7 @@ pub fn trace_arcs(
         }
         arcs.push(points);
     }
-    let welded = weld(mesh, &exact, &arcs, Meeting::Wrong)?;
+    let welded = overlay(mesh, &exact, &arcs, Meeting::Wrong)?;
     let seeds = seeds(layout, &welded.mesh, &welded.paths)?;
     let parameters = welded.paths.iter().map(|p| parameters(&welded.mesh, &welded.map, p)).collect();
     let embedding = Embedding {
@@ -174,7 +175,7 @@ pub fn trace_arcs(
         arc_parameters: parameters,
         seeds,
     };
-    Ok(Traced { embedding, mesh: welded.mesh, map: welded.map })
+    Ok(TracedLayout { embedding, mesh: welded.mesh, map: welded.map })
 }
 
 /// The arcs as polylines, each by itself and as far as a map that need not be free of folds lets them be traced;

@@ -8,16 +8,16 @@
 use thiserror::Error;
 
 use crate::dual::{Mark, RefinedMesh, next};
-use crate::embed::trace::arcs::{TraceError, Traced, misplaced, parameters, points, seeds, straighten};
+use crate::embed::trace::arcs::{TraceError, TracedLayout, misplaced, parameters, points, seeds, straighten};
 use crate::embed::trace::isolines::{Exit, Isolines, Slot, Step, Stop, exactness, nodes_at};
-use crate::embed::trace::overlay::{Meeting, Point, weld};
+use crate::embed::trace::overlay::{Meeting, Point, overlay};
 use crate::layout::{Arc, Embedding, LayoutError, Node, Patch, QuadLayout};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 
 /// Why a map has no base complex.
 #[derive(Debug, Error)]
-pub enum EmergeError {
+pub enum CompletionError {
     /// An isoline comes to no node and not to the boundary within the length allowed.
     #[error("an isoline from node {node} does not end")]
     Endless {
@@ -46,11 +46,11 @@ pub enum EmergeError {
 
 /// A layout with the embedding it was read off.
 #[derive(Debug, Clone)]
-pub struct Emerged {
+pub struct CompletedLayout {
     /// The layout; the nodes given come first.
     pub layout: QuadLayout,
     /// Its embedding.
-    pub traced: Traced,
+    pub traced: TracedLayout,
 }
 
 /// The base complex of `map` with `nodes` for nodes, which must hold all its singular vertices and all corners of
@@ -58,10 +58,15 @@ pub struct Emerged {
 ///
 /// # Errors
 ///
-/// See [`EmergeError`].
-pub fn emerge(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId], limit: f64) -> Result<Emerged, EmergeError> {
+/// See [`CompletionError`].
+pub fn complete_layout(
+    mesh: &TriMesh,
+    map: &SeamlessMap,
+    nodes: &[VertexId],
+    limit: f64,
+) -> Result<CompletedLayout, CompletionError> {
     let (lines, exact) = separatrices(mesh, map, nodes, limit)?;
-    let welded = weld(mesh, &exact, &lines, Meeting::Vertex)?;
+    let welded = overlay(mesh, &exact, &lines, Meeting::Vertex)?;
     let mut refined = welded.refined;
     let mut nodes: Vec<u32> = nodes.iter().map(|v| v.0).collect();
     let is_node = find_nodes(&mut nodes, &welded.paths, welded.mesh.n_vertices());
@@ -69,7 +74,7 @@ pub fn emerge(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId], limit: f64)
     arcs.extend(boundary_arcs(&welded.mesh, &is_node));
     for (arc, path) in (0u32..).zip(&arcs) {
         for w in path.windows(2) {
-            let h = refined.find(w[0], w[1]).ok_or(EmergeError::Sides { arc: arc as usize })?;
+            let h = refined.find(w[0], w[1]).ok_or(CompletionError::Sides { arc: arc as usize })?;
             refined.set_mark(h, Mark::Arc(arc));
         }
     }
@@ -77,7 +82,7 @@ pub fn emerge(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId], limit: f64)
     let seeds = seeds(&layout, &welded.mesh, &arcs)?;
     let arc_parameters = arcs.iter().map(|p| parameters(&welded.mesh, &welded.map, p)).collect();
     let embedding = Embedding { mesh: refined, base_face: welded.base_face, nodes, arcs, arc_parameters, seeds };
-    Ok(Emerged { layout, traced: Traced { embedding, mesh: welded.mesh, map: welded.map } })
+    Ok(CompletedLayout { layout, traced: TracedLayout { embedding, mesh: welded.mesh, map: welded.map } })
 }
 
 /// The isolines of all nodes, each once, and the map in which they are exact.
@@ -86,7 +91,7 @@ fn separatrices(
     map: &SeamlessMap,
     nodes: &[VertexId],
     limit: f64,
-) -> Result<(Vec<Vec<Point>>, SeamlessMap), EmergeError> {
+) -> Result<(Vec<Vec<Point>>, SeamlessMap), CompletionError> {
     let at = nodes_at(mesh, nodes);
     let lines = Isolines { mesh, map, node: &at, exact: exactness(map), through_folds: false };
     let slots: Vec<Vec<Slot>> = nodes.iter().map(|&v| lines.slots(v)).collect();
@@ -104,14 +109,14 @@ fn separatrices(
                 Ok(_) => {
                     let Some(Step::Vertex(end, _)) = steps.last() else { continue };
                     let to = at[mesh.origin(*end).index()] as usize;
-                    let arrival = lines.arrival(&steps, &slots[to]).ok_or(EmergeError::Fold { node })?;
+                    let arrival = lines.arrival(&steps, &slots[to]).ok_or(CompletionError::Fold { node })?;
                     done[to][arrival] = true;
                     &steps[1..steps.len() - 1]
                 }
                 Err(Stop::Boundary(_)) => &steps[1..],
                 Err(Stop::Vertex(v)) if mesh.is_boundary_vertex(v) => &steps[1..],
-                Err(Stop::Length(_)) => return Err(EmergeError::Endless { node }),
-                Err(Stop::Fold(_) | Stop::Vertex(_)) => return Err(EmergeError::Fold { node }),
+                Err(Stop::Length(_)) => return Err(CompletionError::Endless { node }),
+                Err(Stop::Fold(_) | Stop::Vertex(_)) => return Err(CompletionError::Fold { node }),
             };
             straighten(&lines, &mut exact, inner);
             found.push(steps);
@@ -196,7 +201,7 @@ fn structure(
     mesh: &TriMesh,
     nodes: &[u32],
     paths: &[Vec<u32>],
-) -> Result<QuadLayout, EmergeError> {
+) -> Result<QuadLayout, CompletionError> {
     let node = {
         let vertices: Vec<VertexId> = nodes.iter().map(|&v| VertexId(v)).collect();
         nodes_at(mesh, &vertices)
@@ -223,7 +228,7 @@ fn structure(
         if used[first.0][usize::from(first.1)] || outside() {
             continue;
         }
-        let error = || EmergeError::Sides { arc: first.0 };
+        let error = || CompletionError::Sides { arc: first.0 };
         let mut sides = Vec::new();
         let mut side = first;
         loop {

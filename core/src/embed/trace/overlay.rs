@@ -64,7 +64,7 @@ pub(in crate::embed) enum Meeting {
 }
 
 /// Refines `mesh` along `arcs`.
-pub(in crate::embed) fn weld(
+pub(in crate::embed) fn overlay(
     mesh: &TriMesh,
     map: &SeamlessMap,
     arcs: &[Vec<Point>],

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::dual::Mark;
-use crate::embed::trace::arcs::Traced;
-use crate::layout::{Lookup, PatchMap, Piece, QuadLayout, border_sides, flood};
+use crate::embed::trace::arcs::TracedLayout;
+use crate::layout::{ArcLookup, PatchMap, QuadLayout, Submesh, patch_faces, patch_sides};
 use crate::mesh::{TriMesh, TriMeshError};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
@@ -57,10 +57,10 @@ pub enum RectangleError {
 /// See [`RectangleError`].
 pub fn map_rectangles(
     layout: &QuadLayout,
-    traced: &Traced,
+    traced: &TracedLayout,
     progress: &Progress,
 ) -> Result<Vec<PatchMap>, RectangleError> {
-    let lookup = Lookup::new(&traced.embedding);
+    let lookup = ArcLookup::new(&traced.embedding);
     (0..layout.patches.len())
         .into_par_iter()
         .map(|patch| {
@@ -72,16 +72,16 @@ pub fn map_rectangles(
 
 fn map_rectangle(
     layout: &QuadLayout,
-    traced: &Traced,
-    lookup: &Lookup,
+    traced: &TracedLayout,
+    lookup: &ArcLookup,
     patch: usize,
 ) -> Result<PatchMap, RectangleError> {
     let embedding = &traced.embedding;
     let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
-    let faces = flood(&embedding.mesh, embedding.seeds[patch], on_arc);
+    let faces = patch_faces(&embedding.mesh, embedding.seeds[patch], on_arc);
     let piece =
-        Piece::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| RectangleError::NoDisc { patch, source })?;
-    let sides = border_sides(layout, lookup, &piece, patch).ok_or(RectangleError::Sides { patch })?;
+        Submesh::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| RectangleError::NoDisc { patch, source })?;
+    let sides = patch_sides(layout, lookup, &piece, patch).ok_or(RectangleError::Sides { patch })?;
     if piece.mesh.euler_characteristic() != 1 {
         return Err(RectangleError::Sides { patch });
     }
@@ -98,7 +98,7 @@ fn map_rectangle(
 
 /// The coordinates of all vertices of a patch in the chart of its first triangle, and by how much the triangles
 /// at a vertex disagree at most. Face `k` of the patch is face `faces[k]` of the traced mesh.
-fn one_chart(traced: &Traced, patch: &TriMesh, faces: &[u32]) -> (Vec<DVec2>, f64) {
+fn one_chart(traced: &TracedLayout, patch: &TriMesh, faces: &[u32]) -> (Vec<DVec2>, f64) {
     let whole = |h: crate::mesh::HalfedgeId| crate::mesh::HalfedgeId(3 * faces[h.index() / 3] + h.0 % 3);
     let mut chart: Vec<Option<Transition>> = vec![None; faces.len()];
     let mut uv: Vec<Option<DVec2>> = vec![None; patch.n_vertices()];

@@ -47,7 +47,7 @@ impl Run {
 type Spoke = Result<(Marched, usize, usize), Stop>;
 
 /// The isolines of all nodes, to be matched with the arcs.
-pub(in crate::embed) struct Rose<'a> {
+pub(in crate::embed) struct SeparatrixMatching<'a> {
     layout: &'a QuadLayout,
     mesh: &'a TriMesh,
     runs: Vec<Run>,
@@ -64,7 +64,7 @@ pub(in crate::embed) struct Rose<'a> {
     turned: Vec<usize>,
 }
 
-impl<'a> Rose<'a> {
+impl<'a> SeparatrixMatching<'a> {
     pub fn new(
         lines: &Isolines<'a>,
         layout: &'a QuadLayout,

@@ -1,19 +1,19 @@
 use glam::{DVec2, DVec3};
 
-use crate::embed::Emerged;
+use crate::embed::CompletedLayout;
 use crate::embed::RectangleError;
 use crate::embed::map_rectangles;
-use crate::embed::trace::arcs::{Folds, TraceError, Traced, preview_arcs, trace_arcs};
-use crate::embed::trace::completion::emerge;
+use crate::embed::trace::arcs::{FlippedTriangles, TraceError, TracedLayout, preview_arcs, trace_arcs};
+use crate::embed::trace::completion::complete_layout;
 use crate::embed::trace::samples::{self, Sample};
 use crate::layout::PatchMap;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, Stops, refine};
+use crate::quad::{QuadMesh, Spacing, refine};
 
-fn trace(s: &Sample) -> Result<Traced, TraceError> {
-    trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), Folds::Refuse)
+fn trace(s: &Sample) -> Result<TracedLayout, TraceError> {
+    trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Refuse)
 }
 
 fn area(mesh: &TriMesh) -> f64 {
@@ -21,7 +21,7 @@ fn area(mesh: &TriMesh) -> f64 {
 }
 
 /// Traces a sample and checks everything that holds for every layout in a map without folds.
-fn rectangles(s: &Sample) -> (Traced, Vec<PatchMap>) {
+fn rectangles(s: &Sample) -> (TracedLayout, Vec<PatchMap>) {
     let traced = trace(s).unwrap();
     let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
     assert!(maps.iter().all(|m| m.flipped == 0));
@@ -42,7 +42,7 @@ fn rectangles(s: &Sample) -> (Traced, Vec<PatchMap>) {
         let length = |p: &[DVec3]| p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
         assert!((length(line) - length(&path)).abs() < 1e-3 * length(&path));
     }
-    let quads = refine(&s.layout, &traced.embedding, &maps, &Stops::even(&s.layout, &vec![5; s.layout.chords]));
+    let quads = refine(&s.layout, &traced.embedding, &maps, &Spacing::even(&s.layout, &vec![5; s.layout.chords]));
     assert_eq!(euler(&quads), s.mesh.euler_characteristic());
     (traced, maps)
 }
@@ -88,7 +88,7 @@ fn arcs_inside_a_square_cross_triangles() {
 fn quads_continue_across_arcs_by_the_parameter() {
     let s = samples::square(8, 2, 0.3);
     let (traced, maps) = rectangles(&s);
-    let quads = refine(&s.layout, &traced.embedding, &maps, &Stops::even(&s.layout, &vec![4; s.layout.chords]));
+    let quads = refine(&s.layout, &traced.embedding, &maps, &Spacing::even(&s.layout, &vec![4; s.layout.chords]));
     // The map is the identity: all vertices of the quads lie on a regular grid.
     for p in &quads.positions {
         assert!((*p * 8.0 - (*p * 8.0).round()).length() < 1e-9, "{p}");
@@ -158,7 +158,7 @@ fn a_common_first_triangle_is_enough_to_tell_arcs_of_a_node_apart() {
     }
 }
 
-fn rectangles_without_preview(s: &Sample) -> (Traced, Vec<PatchMap>) {
+fn rectangles_without_preview(s: &Sample) -> (TracedLayout, Vec<PatchMap>) {
     let traced = trace(s).unwrap();
     let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
     (traced, maps)
@@ -255,13 +255,13 @@ fn a_patch_that_is_no_rectangle_is_an_error() {
 }
 
 /// The base complex of a sample with some of its nodes, checked.
-fn emerged(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId]) -> Emerged {
-    let e = emerge(mesh, map, nodes, 100.0).unwrap();
+fn emerged(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId]) -> CompletedLayout {
+    let e = complete_layout(mesh, map, nodes, 100.0).unwrap();
     let maps = map_rectangles(&e.layout, &e.traced, &Progress::new()).unwrap();
     assert!(maps.iter().all(|m| m.flipped == 0));
     let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
     assert!((parts - area(mesh)).abs() < 1e-9);
-    let quads = refine(&e.layout, &e.traced.embedding, &maps, &Stops::even(&e.layout, &vec![4; e.layout.chords]));
+    let quads = refine(&e.layout, &e.traced.embedding, &maps, &Spacing::even(&e.layout, &vec![4; e.layout.chords]));
     assert_eq!(euler(&quads), mesh.euler_characteristic());
     e
 }
@@ -326,7 +326,7 @@ fn a_slanted_cube_has_the_lattice_for_its_base_complex() {
 }
 
 /// The sample of a layout whose arcs are edges of the mesh; chains run beside them, on the left.
-fn beside(e: &Emerged) -> Sample {
+fn beside(e: &CompletedLayout) -> Sample {
     let (mesh, map) = (e.traced.mesh.clone(), e.traced.map.clone());
     let nodes = e.traced.embedding.nodes.iter().map(|&v| VertexId(v)).collect();
     let mut chains = Vec::new();
@@ -398,7 +398,7 @@ fn arcs_can_cross_folds() {
         by = crate::param::turn(by, i32::from(change.turns));
     }
     assert!(matches!(trace(&s), Err(TraceError::Fold { .. })));
-    let traced = trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), Folds::Cross).unwrap();
+    let traced = trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Cross).unwrap();
     let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
     sizes_are(&maps, DVec2::splat(0.5));
     assert!(maps.iter().filter(|m| m.flipped > 0).count() == 2);
@@ -436,7 +436,8 @@ fn isolines_leave_a_node_that_lies_in_a_fold() {
                 through_folds: true,
             };
             assert_eq!(lines.slots(s.nodes[0]).len(), k as usize, "{k} {i} {far}");
-            let traced = trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), Folds::Cross).unwrap();
+            let traced =
+                trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Cross).unwrap();
             let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
             let folded = s.mesh.faces().any(|f| s.map.is_flipped(f));
             assert_eq!(maps.iter().any(|m| m.flipped > 0), folded);

@@ -6,7 +6,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{ArcEnd, Drawing, FileArc, FileNode, LayoutFile, LayoutFileError, PathPoint};
+use super::{ArcEnd, FileArc, FileNode, LayoutFile, LayoutFileError, PartialEmbedding, PathPoint};
 use crate::dual::RefinedMesh;
 use crate::layout::initial_embedding::Embedding;
 use crate::layout::structure::{Node, QuadLayout};
@@ -47,8 +47,12 @@ impl LayoutFile {
     /// # Errors
     ///
     /// [`LayoutFileError::NotOnMesh`] if the drawing is not one on `base`.
-    pub fn from_drawing(source: MeshSource, base: &TriMesh, drawing: &Drawing) -> Result<Self, LayoutFileError> {
-        let Drawing { mesh, base_face, nodes, kinds, arcs, ends, .. } = drawing;
+    pub fn from_drawing(
+        source: MeshSource,
+        base: &TriMesh,
+        drawing: &PartialEmbedding,
+    ) -> Result<Self, LayoutFileError> {
+        let PartialEmbedding { mesh, base_face, nodes, kinds, arcs, ends, .. } = drawing;
         Paths { base, mesh, base_face }.write(source, kinds, nodes, arcs, ends)
     }
 }
@@ -68,7 +72,7 @@ fn slots(
     let mut slots = HashMap::new();
     for (node, (&v, kind)) in nodes.iter().zip(kinds).enumerate() {
         let mut ends = 0;
-        for w in mesh.spokes(v) {
+        for w in mesh.neighbours(v) {
             if leaving.contains(&(v, w)) {
                 slots.insert((v, w), ends);
                 ends += 1;

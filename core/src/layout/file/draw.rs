@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use glam::{DVec2, DVec3};
 
 use super::place::{Place, Stop, along_boundary, check_slots, node_place, stops};
-use super::{ArcEnd, DrawError, LayoutFile, Part};
+use super::{ArcEnd, LayoutFile, Part, PartialEmbeddingError};
 use crate::dual::{Mark, RefinedMesh};
 use crate::mesh::{EdgeId, FaceId, TriMesh};
 
@@ -39,7 +39,7 @@ struct Step {
     at_inner_node: bool,
 }
 
-pub(super) fn draw(file: &LayoutFile, base: &TriMesh) -> Result<Drawn, DrawError> {
+pub(super) fn draw(file: &LayoutFile, base: &TriMesh) -> Result<Drawn, PartialEmbeddingError> {
     let places: Vec<Place> =
         file.nodes.iter().enumerate().map(|(n, node)| node_place(base, n as u32, node)).collect::<Result<_, _>>()?;
     check_slots(file, base, &places)?;
@@ -67,7 +67,12 @@ struct Canvas<'a> {
 
 impl Canvas<'_> {
     /// Makes vertices of all nodes and stops; returns those of the nodes.
-    fn insert(&mut self, file: &LayoutFile, places: &[Place], arcs: &mut [Vec<Stop>]) -> Result<Vec<u32>, DrawError> {
+    fn insert(
+        &mut self,
+        file: &LayoutFile,
+        places: &[Place],
+        arcs: &mut [Vec<Stop>],
+    ) -> Result<Vec<u32>, PartialEmbeddingError> {
         let mut nodes = vec![u32::MAX; places.len()];
         let mut parts = HashMap::new();
         let mut on_edges: Vec<(EdgeId, f64, Part, usize)> = Vec::new();
@@ -109,17 +114,17 @@ impl Canvas<'_> {
         mut on_edges: Vec<(EdgeId, f64, Part, usize)>,
         nodes: &mut [u32],
         arcs: &mut [Vec<Stop>],
-    ) -> Result<(), DrawError> {
+    ) -> Result<(), PartialEmbeddingError> {
         on_edges.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)));
         for run in on_edges.chunk_by(|x, y| x.0 == y.0) {
             if let Some(w) = run.windows(2).find(|w| w[0].1 >= w[1].1) {
-                return Err(DrawError::Meet { first: w[0].2, second: w[1].2 });
+                return Err(PartialEmbeddingError::Meet { first: w[0].2, second: w[1].2 });
             }
             self.on_edge.insert(run[0].0, run.iter().map(|x| x.2).collect());
             let (mut rest, mut from) = (self.whole_edge(run[0].0), 0.0);
             for &(_, t, part, k) in run {
                 let x = self.mesh.split_edge(rest, (t - from) / (1.0 - from));
-                (rest, from) = (self.mesh.any_outgoing(x), t);
+                (rest, from) = (self.mesh.vertex_halfedge(x), t);
                 self.owner.insert(x, part);
                 match part {
                     Part::Node(n) => nodes[n as usize] = x,
@@ -137,9 +142,9 @@ impl Canvas<'_> {
         self.mesh.outgoing(self.base.origin(h).0).into_iter().find(along).unwrap_or(h.0)
     }
 
-    fn take(&mut self, vertex: u32, part: Part) -> Result<(), DrawError> {
+    fn take(&mut self, vertex: u32, part: Part) -> Result<(), PartialEmbeddingError> {
         match self.owner.insert(vertex, part) {
-            Some(first) => Err(DrawError::Meet { first, second: part }),
+            Some(first) => Err(PartialEmbeddingError::Meet { first, second: part }),
             None => Ok(()),
         }
     }
@@ -153,7 +158,7 @@ impl Canvas<'_> {
         f: FaceId,
         nodes: &[u32],
         parts: &mut HashMap<u32, Vec<u32>>,
-    ) -> Result<u32, DrawError> {
+    ) -> Result<u32, PartialEmbeddingError> {
         let weights = |w: [f64; 3]| DVec2::new(w[1], w[2]);
         let at = file.nodes[n as usize].at;
         let point = weights(at.weights);
@@ -181,7 +186,7 @@ impl Canvas<'_> {
             if let Some(&owner @ Part::Node(other)) = self.owner.get(&v)
                 && file.nodes[other as usize].at == at
             {
-                return Err(DrawError::Meet { first: owner, second: Part::Node(n) });
+                return Err(PartialEmbeddingError::Meet { first: owner, second: Part::Node(n) });
             }
         }
         let before = self.mesh.n_faces() as u32;
@@ -205,17 +210,17 @@ impl Canvas<'_> {
         places: &[Place],
         nodes: &[u32],
         arcs: &[Vec<Stop>],
-    ) -> Result<Vec<Vec<u32>>, DrawError> {
+    ) -> Result<Vec<Vec<u32>>, PartialEmbeddingError> {
         let mut steps = Vec::new();
         let mut paths: Vec<Vec<Vec<u32>>> = Vec::with_capacity(arcs.len());
         for (a, stops) in arcs.iter().enumerate() {
             let border = along_boundary(file, self.base, places, a).filter(|_| file.arcs[a].path.is_empty());
             if let Some(ends) = border {
                 let arc = a as u32;
-                let meet = |other| DrawError::Meet { first: Part::Arc(other), second: Part::Arc(arc) };
+                let meet = |other| PartialEmbeddingError::Meet { first: Part::Arc(other), second: Part::Arc(arc) };
                 let mut path = self.boundary_path(arc, nodes[ends[0] as usize]).map_err(meet)?;
                 if path[path.len() - 1] != nodes[ends[1] as usize] {
-                    return Err(DrawError::OffBoundary { arc });
+                    return Err(PartialEmbeddingError::OffBoundary { arc });
                 }
                 if file.arcs[a].ends[0].slot != 0 {
                     path.reverse();
@@ -241,11 +246,11 @@ impl Canvas<'_> {
     }
 
     /// Where a step runs.
-    fn step(&self, arc: u32, index: usize, stops: &[Stop]) -> Result<Step, DrawError> {
+    fn step(&self, arc: u32, index: usize, stops: &[Stop]) -> Result<Step, PartialEmbeddingError> {
         let (from, to) = (stops[index], stops[index + 1]);
         let inner = |s: Stop| matches!(s.place, Place::Inside(_));
         let at_inner_node = inner(from) || inner(to);
-        let gap = DrawError::Gap { arc, step: index };
+        let gap = PartialEmbeddingError::Gap { arc, step: index };
         if from.vertex == to.vertex {
             return Err(gap);
         }
@@ -285,13 +290,14 @@ impl Canvas<'_> {
         nodes: &[u32],
         arcs: &mut Vec<Vec<u32>>,
         ends: &mut Vec<[ArcEnd; 2]>,
-    ) -> Result<(), DrawError> {
+    ) -> Result<(), PartialEmbeddingError> {
         let taken: HashSet<u32> = ends.iter().flatten().filter(|e| e.slot == 0).map(|e| e.node).collect();
         for (node, &v) in (0..).zip(nodes).filter(|(n, _)| !taken.contains(n)) {
             if !self.mesh.is_boundary(self.mesh.outgoing(v)[0]) {
                 continue;
             }
-            let path = self.boundary_path(arcs.len() as u32, v).map_err(|arc| DrawError::OnBoundary { arc })?;
+            let path =
+                self.boundary_path(arcs.len() as u32, v).map_err(|arc| PartialEmbeddingError::OnBoundary { arc })?;
             if let Some(&Part::Node(to)) = self.owner.get(&path[path.len() - 1]) {
                 let last = file.nodes[to as usize].valence;
                 ends.push([ArcEnd { node, slot: 0 }, ArcEnd { node: to, slot: last }]);
@@ -302,11 +308,11 @@ impl Canvas<'_> {
     }
 
     /// Draws a step along a mesh edge.
-    fn draw_along(&mut self, arc: u32, [from, to]: [Stop; 2]) -> Result<Vec<u32>, DrawError> {
+    fn draw_along(&mut self, arc: u32, [from, to]: [Stop; 2]) -> Result<Vec<u32>, PartialEmbeddingError> {
         let (p, q) = (from.vertex, to.vertex);
         let edge = from.place.common_edge(self.base, to.place);
         let between = |part: &Part| self.owner.get(&p) != Some(part) && self.owner.get(&q) != Some(part);
-        let meet = |first: Part| DrawError::Meet { first, second: Part::Arc(arc) };
+        let meet = |first: Part| PartialEmbeddingError::Meet { first, second: Part::Arc(arc) };
         let Some(h) = self.mesh.find(p, q).filter(|&h| self.mesh.base_halfedge(h).is_some()) else {
             let there = edge.and_then(|e| self.on_edge.get(&e)).and_then(|list| list.iter().copied().find(between));
             return Err(meet(there.unwrap_or(Part::Arc(arc))));
@@ -319,12 +325,12 @@ impl Canvas<'_> {
     }
 
     /// Draws a step inside a triangle.
-    fn draw_inside(&mut self, arc: u32, face: FaceId, ends: [Stop; 2]) -> Result<Vec<u32>, DrawError> {
+    fn draw_inside(&mut self, arc: u32, face: FaceId, ends: [Stop; 2]) -> Result<Vec<u32>, PartialEmbeddingError> {
         let (p, q) = (ends[0].vertex, ends[1].vertex);
         if let Some(h) = self.mesh.find(p, q)
             && let Mark::Arc(other) = self.mesh.mark(h)
         {
-            return Err(DrawError::Meet { first: Part::Arc(other), second: Part::Arc(arc) });
+            return Err(PartialEmbeddingError::Meet { first: Part::Arc(other), second: Part::Arc(arc) });
         }
         let [a, b, _] = self.base.face_vertices(face).map(|v| self.base.position(v));
         let x = (b - a).normalize_or(DVec3::X);
@@ -334,18 +340,18 @@ impl Canvas<'_> {
             DVec2::new(d.dot(x), d.dot(y))
         };
         let inside = |m: &RefinedMesh, f: u32| m.base_face(f) == face.0;
-        if let Ok(path) = self.mesh.draw((p, q), Mark::Arc(arc), inside, |_| true, plane) {
+        if let Ok(path) = self.mesh.insert_path((p, q), Mark::Arc(arc), inside, |_| true, plane) {
             return Ok(path);
         }
         // What is in the way is found by drawing across it.
-        let across = self.mesh.draw((p, q), Mark::Arc(arc), inside, |_| false, plane);
-        let Ok(path) = across else { return Err(DrawError::NoWay { arc, face }) };
+        let across = self.mesh.insert_path((p, q), Mark::Arc(arc), inside, |_| false, plane);
+        let Ok(path) = across else { return Err(PartialEmbeddingError::NoWay { arc, face }) };
         let other =
             path[1..path.len() - 1].iter().flat_map(|&v| self.mesh.outgoing(v)).find_map(|h| match self.mesh.mark(h) {
                 Mark::Arc(other) if other != arc => Some(other),
                 _ => None,
             });
-        Err(DrawError::Cross { first: other.unwrap_or(arc), second: arc, face })
+        Err(PartialEmbeddingError::Cross { first: other.unwrap_or(arc), second: arc, face })
     }
 }
 

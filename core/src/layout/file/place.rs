@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{DrawError, FileNode, LayoutFile, MAX_VALENCE, PathPoint};
+use super::{FileNode, LayoutFile, MAX_VALENCE, PartialEmbeddingError, PathPoint};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Crossing;
 
@@ -33,17 +33,17 @@ pub(super) fn node_place(
     base: &TriMesh,
     node: u32,
     FileNode { at, valence, .. }: &FileNode,
-) -> Result<Place, DrawError> {
+) -> Result<Place, PartialEmbeddingError> {
     if at.face.index() >= base.n_faces() {
-        return Err(DrawError::UnknownFace { node, face: at.face });
+        return Err(PartialEmbeddingError::UnknownFace { node, face: at.face });
     }
     let sum: f64 = at.weights.iter().sum();
     let fits = at.weights.iter().all(|w| (0.0..=1.0).contains(w)) && (sum - 1.0).abs() <= WEIGHT_SUM;
     if !fits {
-        return Err(DrawError::Weights { node });
+        return Err(PartialEmbeddingError::Weights { node });
     }
     if !(1..=MAX_VALENCE).contains(valence) {
-        return Err(DrawError::Valence { node, valence: *valence });
+        return Err(PartialEmbeddingError::Valence { node, valence: *valence });
     }
     let [h0, h1, h2] = base.face_halfedges(at.face);
     Ok(match at.weights.map(|w| w > 0.0) {
@@ -108,21 +108,21 @@ impl Place {
 }
 
 /// Checks that nodes and slots exist and that no slot is taken twice.
-pub(super) fn check_slots(file: &LayoutFile, base: &TriMesh, places: &[Place]) -> Result<(), DrawError> {
+pub(super) fn check_slots(file: &LayoutFile, base: &TriMesh, places: &[Place]) -> Result<(), PartialEmbeddingError> {
     let mut taken = HashMap::new();
     for (arc, a) in file.arcs.iter().enumerate() {
         let arc = arc as u32;
         for end in a.ends {
             let (node, slot) = (end.node, end.slot);
             let Some(place) = places.get(node as usize) else {
-                return Err(DrawError::UnknownNode { arc, node, count: places.len() });
+                return Err(PartialEmbeddingError::UnknownNode { arc, node, count: places.len() });
             };
             let last = file.nodes[node as usize].valence - u32::from(!place.is_boundary(base));
             if slot > last {
-                return Err(DrawError::UnknownSlot { arc, node, slot, last });
+                return Err(PartialEmbeddingError::UnknownSlot { arc, node, slot, last });
             }
             if let Some(other) = taken.insert((node, slot), arc) {
-                return Err(DrawError::SlotTaken { node, slot, arcs: [other, arc] });
+                return Err(PartialEmbeddingError::SlotTaken { node, slot, arcs: [other, arc] });
             }
         }
     }
@@ -142,12 +142,17 @@ pub(super) fn along_boundary(file: &LayoutFile, base: &TriMesh, places: &[Place]
 }
 
 /// The stops of an arc, both nodes included.
-pub(super) fn stops(file: &LayoutFile, base: &TriMesh, places: &[Place], a: usize) -> Result<Vec<Stop>, DrawError> {
+pub(super) fn stops(
+    file: &LayoutFile,
+    base: &TriMesh,
+    places: &[Place],
+    a: usize,
+) -> Result<Vec<Stop>, PartialEmbeddingError> {
     let arc = &file.arcs[a];
     let at_node = |i: usize| Stop { place: places[arc.ends[i].node as usize], faces: None, vertex: u32::MAX };
     let mut list = vec![at_node(0)];
     for (place, point) in arc.path.iter().enumerate() {
-        let wrong = |reason| DrawError::Place { arc: a as u32, place, reason };
+        let wrong = |reason| PartialEmbeddingError::Place { arc: a as u32, place, reason };
         list.push(match *point {
             PathPoint::Vertex { vertex } if vertex.index() >= base.n_vertices() => {
                 return Err(wrong("the mesh has no such vertex"));

@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 
 use super::draw::Drawn;
-use super::{ArcEnd, DrawError, LayoutFile};
+use super::{ArcEnd, LayoutFile, PartialEmbeddingError};
 use crate::dual::{Mark, RefinedMesh, next};
 use crate::layout::initial_embedding::{Embedding, lengths};
 use crate::layout::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
@@ -17,7 +17,7 @@ use crate::mesh::FaceId;
 
 /// A corner of a region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DrawnCorner {
+pub struct PartialCorner {
     /// The node.
     pub node: u32,
     /// Place in the border of the half-edge that leaves the node.
@@ -26,7 +26,7 @@ pub struct DrawnCorner {
     pub sectors: u32,
 }
 
-impl DrawnCorner {
+impl PartialCorner {
     /// By how many quarters the border turns here, to the left.
     pub fn turn(&self) -> i64 {
         2 - i64::from(self.sectors)
@@ -35,17 +35,17 @@ impl DrawnCorner {
 
 /// A region between arcs, an open disc.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DrawnRegion {
+pub struct PartialRegion {
     /// The half-edges around it in order, with the region to the left; an arc with the region on both its sides
     /// occurs in both directions.
     pub border: Vec<u32>,
     /// Its corners, in the order of the border.
-    pub corners: Vec<DrawnCorner>,
+    pub corners: Vec<PartialCorner>,
 }
 
 /// A layout, complete or not, drawn on a refinement of the surface.
 #[derive(Debug, Clone)]
-pub struct Drawing {
+pub struct PartialEmbedding {
     /// The surface, with all arcs as edge paths marked [`Mark::Arc`].
     pub mesh: RefinedMesh,
     /// Triangle of the original mesh that each face lies in.
@@ -65,11 +65,11 @@ pub struct Drawing {
     /// Region of each face.
     pub region: Vec<u32>,
     /// All regions, by their first face.
-    pub regions: Vec<DrawnRegion>,
+    pub regions: Vec<PartialRegion>,
 }
 
-impl Drawing {
-    pub(super) fn new(file: &LayoutFile, drawn: Drawn) -> Result<Self, DrawError> {
+impl PartialEmbedding {
+    pub(super) fn new(file: &LayoutFile, drawn: Drawn) -> Result<Self, PartialEmbeddingError> {
         let Drawn { mesh, nodes, arcs, ends } = drawn;
         let kinds = nodes.iter().zip(&file.nodes).map(|(&v, n)| {
             let boundary = mesh.is_boundary(mesh.outgoing(v)[0]);
@@ -106,7 +106,7 @@ impl Drawing {
     }
 
     /// Checks that boundary arcs run along the boundary all the way, and others keep off it.
-    fn check_boundary(&self) -> Result<(), DrawError> {
+    fn check_boundary(&self) -> Result<(), PartialEmbeddingError> {
         for (a, path) in self.arcs.iter().enumerate() {
             let arc = a as u32;
             let on_boundary = |w: &[u32]| {
@@ -115,12 +115,12 @@ impl Drawing {
             };
             if self.is_boundary_arc(a) {
                 if !path.windows(2).all(on_boundary) {
-                    return Err(DrawError::OffBoundary { arc });
+                    return Err(PartialEmbeddingError::OffBoundary { arc });
                 }
             } else {
                 let touches = |&v: &u32| self.mesh.is_boundary(self.mesh.outgoing(v)[0]);
                 if path[1..path.len() - 1].iter().any(touches) || path.windows(2).any(on_boundary) {
-                    return Err(DrawError::OnBoundary { arc });
+                    return Err(PartialEmbeddingError::OnBoundary { arc });
                 }
             }
         }
@@ -129,7 +129,7 @@ impl Drawing {
 
     /// The slot in which each edge leaves its node, by the edge's two vertices; at boundary nodes also those of the
     /// boundary edges, whether there are arcs or not.
-    fn slots(&self) -> Result<HashMap<(u32, u32), u32>, DrawError> {
+    fn slots(&self) -> Result<HashMap<(u32, u32), u32>, PartialEmbeddingError> {
         let mut of_edge = HashMap::new();
         for (a, (path, ends)) in self.arcs.iter().zip(&self.ends).enumerate() {
             of_edge.insert((path[0], path[1]), (ends[0].slot, a as u32));
@@ -137,35 +137,35 @@ impl Drawing {
         }
         let mut slots: HashMap<(u32, u32), u32> = of_edge.iter().map(|(&edge, &(slot, _))| (edge, slot)).collect();
         for (node, (&v, kind)) in self.nodes.iter().zip(&self.kinds).enumerate() {
-            let spokes = self.mesh.spokes(v);
-            let found: Vec<(usize, u32, u32)> = spokes
+            let neighbours = self.mesh.neighbours(v);
+            let found: Vec<(usize, u32, u32)> = neighbours
                 .iter()
                 .enumerate()
                 .filter_map(|(i, &w)| of_edge.get(&(v, w)).map(|&(slot, arc)| (i, slot, arc)))
                 .collect();
             let valence = kind.valence as u32;
             let in_order = if kind.boundary {
-                let last = spokes.len() - 1;
-                slots.insert((v, spokes[0]), 0);
-                slots.insert((v, spokes[last]), valence);
+                let last = neighbours.len() - 1;
+                slots.insert((v, neighbours[0]), 0);
+                slots.insert((v, neighbours[last]), valence);
                 // The outer slots belong to the boundary edges, and to nothing else.
                 found.iter().all(|&(i, slot, _)| (i == 0) == (slot == 0) && (i == last) == (slot == valence))
                     && found.windows(2).all(|w| w[0].1 < w[1].1)
             } else if found.is_empty() {
-                return Err(DrawError::Isolated { node: node as u32 });
+                return Err(PartialEmbeddingError::Isolated { node: node as u32 });
             } else {
                 let descents = (0..found.len()).filter(|&i| found[(i + 1) % found.len()].1 <= found[i].1).count();
                 descents == 1
             };
             if !in_order {
                 let arcs = found.iter().map(|f| f.2).collect();
-                return Err(DrawError::SlotOrder { node: node as u32, arcs });
+                return Err(PartialEmbeddingError::SlotOrder { node: node as u32, arcs });
             }
         }
         Ok(slots)
     }
 
-    fn find_regions(&mut self, slots: &HashMap<(u32, u32), u32>) -> Result<(), DrawError> {
+    fn find_regions(&mut self, slots: &HashMap<(u32, u32), u32>) -> Result<(), PartialEmbeddingError> {
         let count = self.flood();
         let euler = self.euler(count);
         let mut starts = vec![None; count];
@@ -176,13 +176,13 @@ impl Drawing {
         for (r, (euler, start)) in euler.into_iter().zip(starts).enumerate() {
             let start = start.filter(|_| euler == 1).ok_or_else(|| {
                 let (face, arcs) = self.bounds(r as u32);
-                DrawError::NotADisc { region: r as u32, face, arcs }
+                PartialEmbeddingError::NotADisc { region: r as u32, face, arcs }
             })?;
             let region = self.walk(start, slots, &node_at);
-            let quarters: i64 = region.corners.iter().map(DrawnCorner::turn).sum();
+            let quarters: i64 = region.corners.iter().map(PartialCorner::turn).sum();
             if quarters != 4 {
                 let (face, arcs) = self.bounds(r as u32);
-                return Err(DrawError::Turning { region: r as u32, face, arcs, quarters });
+                return Err(PartialEmbeddingError::Turning { region: r as u32, face, arcs, quarters });
             }
             self.head(&region);
             self.regions.push(region);
@@ -255,8 +255,8 @@ impl Drawing {
     }
 
     /// The border of a disc from half-edge `start` on.
-    fn walk(&self, start: u32, slots: &HashMap<(u32, u32), u32>, node_at: &HashMap<u32, u32>) -> DrawnRegion {
-        let mut region = DrawnRegion { border: vec![start], corners: Vec::new() };
+    fn walk(&self, start: u32, slots: &HashMap<(u32, u32), u32>, node_at: &HashMap<u32, u32>) -> PartialRegion {
+        let mut region = PartialRegion { border: vec![start], corners: Vec::new() };
         loop {
             let arriving = region.border[region.border.len() - 1];
             let mut leaving = next(arriving);
@@ -272,7 +272,7 @@ impl Drawing {
                 let span = slot(self.mesh.origin(arriving)) - slot(self.mesh.target(leaving));
                 let valence = kind.valence as i64;
                 let sectors = if kind.boundary || span > 0 { span } else { span + valence };
-                region.corners.push(DrawnCorner { node, at, sectors: sectors as u32 });
+                region.corners.push(PartialCorner { node, at, sectors: sectors as u32 });
             }
             if leaving == start {
                 break;
@@ -284,7 +284,7 @@ impl Drawing {
     }
 
     /// Notes the directions along the border of a region.
-    fn head(&mut self, region: &DrawnRegion) {
+    fn head(&mut self, region: &PartialRegion) {
         let mut heading = 0;
         let mut corners = region.corners.iter().skip_while(|c| c.at == 0).peekable();
         for (i, &h) in region.border.iter().enumerate() {
@@ -329,10 +329,10 @@ impl Drawing {
 
     /// The regions of a complete layout as patches.
     fn patches(&self) -> Result<Vec<Patch>, LayoutError> {
-        let patch = |(patch, region): (usize, &DrawnRegion)| {
+        let patch = |(patch, region): (usize, &PartialRegion)| {
             let broken = LayoutError::Patch { patch };
-            let corners = <[DrawnCorner; 4]>::try_from(region.corners.clone()).map_err(|_| broken.clone())?;
-            let side = |c: DrawnCorner| self.side(region.border[c.at]).ok_or(broken.clone());
+            let corners = <[PartialCorner; 4]>::try_from(region.corners.clone()).map_err(|_| broken.clone())?;
+            let side = |c: PartialCorner| self.side(region.border[c.at]).ok_or(broken.clone());
             let [a, b, c, d] = corners.map(side);
             Ok(Patch { corners: corners.map(|c| c.node), sides: [a?, b?, c?, d?] })
         };

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::dual::{Arrangement, Mark};
-use crate::embed::Net;
+use crate::embed::EmbeddingTopology;
 use crate::layout::{Embedding, QuadLayout, embed, map_patches};
 use crate::mesh::HalfedgeId;
 use crate::progress::Progress;
@@ -148,10 +148,10 @@ fn tempfile() -> PathBuf {
 
 /// What holds of every drawing: regions turn once, headings change at nodes only and by the corner there, and the
 /// sectors at every node add up to its valence.
-fn check(drawing: &Drawing) {
+fn check(drawing: &PartialEmbedding) {
     let mut sectors = vec![0; drawing.nodes.len()];
     for region in &drawing.regions {
-        assert_eq!(region.corners.iter().map(DrawnCorner::turn).sum::<i64>(), 4);
+        assert_eq!(region.corners.iter().map(PartialCorner::turn).sum::<i64>(), 4);
         let heading = |i: usize| i64::from(drawing.headings[region.border[i] as usize].unwrap());
         assert_eq!(heading(0), 0);
         let n = region.border.len();
@@ -159,7 +159,7 @@ fn check(drawing: &Drawing) {
             let (before, after) = (region.border[(i + n - 1) % n], region.border[i]);
             assert_eq!(drawing.mesh.target(before), drawing.mesh.origin(after));
             let corner = region.corners.iter().find(|c| c.at == i);
-            let turn = corner.map_or(0, DrawnCorner::turn);
+            let turn = corner.map_or(0, PartialCorner::turn);
             assert_eq!((heading(i) - heading((i + n - 1) % n) - turn).rem_euclid(4), 0);
             if let Some(c) = corner {
                 assert_eq!(drawing.mesh.origin(after), drawing.nodes[c.node as usize]);
@@ -233,7 +233,7 @@ fn a_cube_may_lack_arcs_while_its_regions_are_discs() {
     assert_eq!(drawing.regions.len(), 5);
     // Two sides in one: four right angles and two straight ones where the arc was.
     let larger = drawing.regions.iter().find(|r| r.corners.len() == 6).unwrap();
-    let mut turns: Vec<i64> = larger.corners.iter().map(DrawnCorner::turn).collect();
+    let mut turns: Vec<i64> = larger.corners.iter().map(PartialCorner::turn).collect();
     turns.sort_unstable();
     assert_eq!(turns, [0, 0, 1, 1, 1, 1]);
     let again = LayoutFile::from_drawing(source(), &mesh, &drawing).unwrap();
@@ -297,7 +297,7 @@ fn nodes_inside_one_triangle_and_on_edges() {
     round_trip(&mesh, &layout, &embedding);
 }
 
-fn error(change: impl FnOnce(&mut LayoutFile)) -> DrawError {
+fn error(change: impl FnOnce(&mut LayoutFile)) -> PartialEmbeddingError {
     let mesh = cube(4);
     let mut file = cube_file(&mesh, 4);
     change(&mut file);
@@ -306,31 +306,37 @@ fn error(change: impl FnOnce(&mut LayoutFile)) -> DrawError {
 
 #[test]
 fn broken_layouts_are_named() {
-    assert_eq!(error(|f| f.arcs[3].ends[1].node = 8), DrawError::UnknownNode { arc: 3, node: 8, count: 8 });
+    assert_eq!(error(|f| f.arcs[3].ends[1].node = 8), PartialEmbeddingError::UnknownNode { arc: 3, node: 8, count: 8 });
     assert_eq!(
         error(|f| f.arcs[3].ends[0].slot = 7),
-        DrawError::UnknownSlot { arc: 3, node: f_node(3), slot: 7, last: 2 }
+        PartialEmbeddingError::UnknownSlot { arc: 3, node: f_node(3), slot: 7, last: 2 }
     );
-    assert!(matches!(error(|f| f.arcs[0].ends[0].slot = 1), DrawError::SlotTaken { node: 0, slot: 1, .. }));
-    assert_eq!(error(|f| f.nodes[2].at.weights[0] = f64::NAN), DrawError::Weights { node: 2 });
-    assert_eq!(error(|f| f.nodes[2].at.weights = [0.5, 0.6, -0.1]), DrawError::Weights { node: 2 });
-    assert_eq!(error(|f| f.nodes[2].at.face.0 = 1 << 30), DrawError::UnknownFace { node: 2, face: FaceId(1 << 30) });
-    assert_eq!(error(|f| f.nodes[2].valence = 0), DrawError::Valence { node: 2, valence: 0 });
+    assert!(matches!(error(|f| f.arcs[0].ends[0].slot = 1), PartialEmbeddingError::SlotTaken { node: 0, slot: 1, .. }));
+    assert_eq!(error(|f| f.nodes[2].at.weights[0] = f64::NAN), PartialEmbeddingError::Weights { node: 2 });
+    assert_eq!(error(|f| f.nodes[2].at.weights = [0.5, 0.6, -0.1]), PartialEmbeddingError::Weights { node: 2 });
+    assert_eq!(
+        error(|f| f.nodes[2].at.face.0 = 1 << 30),
+        PartialEmbeddingError::UnknownFace { node: 2, face: FaceId(1 << 30) }
+    );
+    assert_eq!(error(|f| f.nodes[2].valence = 0), PartialEmbeddingError::Valence { node: 2, valence: 0 });
     let gap = error(|f| f.arcs[5].path = vec![f.arcs[5].path[0], f.arcs[5].path[2]]);
-    assert_eq!(gap, DrawError::Gap { arc: 5, step: 1 });
+    assert_eq!(gap, PartialEmbeddingError::Gap { arc: 5, step: 1 });
     assert!(matches!(
         error(|f| f.arcs[5].path[0] = PathPoint::Vertex { vertex: VertexId(1 << 20) }),
-        DrawError::Place { arc: 5, place: 0, .. }
+        PartialEmbeddingError::Place { arc: 5, place: 0, .. }
     ));
     let crossing = |h: u32, t: f64| PathPoint::Crossing(Crossing { halfedge: HalfedgeId(h), t });
     for t in [0.0, 1.0, f64::NAN, f64::INFINITY, -1.0] {
         assert!(
-            matches!(error(|f| f.arcs[5].path[0] = crossing(0, t)), DrawError::Place { arc: 5, place: 0, .. }),
+            matches!(
+                error(|f| f.arcs[5].path[0] = crossing(0, t)),
+                PartialEmbeddingError::Place { arc: 5, place: 0, .. }
+            ),
             "{t}"
         );
     }
     // Two nodes at one place, a node on an arc.
-    let meet = |e| matches!(e, DrawError::Meet { .. });
+    let meet = |e| matches!(e, PartialEmbeddingError::Meet { .. });
     assert!(meet(error(|f| f.nodes[1].at = f.nodes[0].at)));
     let node_3 = cube_node(3);
     let through = |f: &mut LayoutFile| f.arcs[0].path.push(PathPoint::Vertex { vertex: node_3 });
@@ -358,13 +364,13 @@ fn slots_out_of_order_are_named() {
             }
         }
     });
-    assert!(matches!(swapped, DrawError::SlotOrder { node: 0, .. }), "{swapped}");
+    assert!(matches!(swapped, PartialEmbeddingError::SlotOrder { node: 0, .. }), "{swapped}");
 }
 
 #[test]
 fn a_valence_that_contradicts_the_turning_is_named_with_its_region() {
     let error = error(|f| f.nodes[0].valence = 4);
-    let DrawError::Turning { arcs, quarters: 3, .. } = &error else { panic!("{error}") };
+    let PartialEmbeddingError::Turning { arcs, quarters: 3, .. } = &error else { panic!("{error}") };
     assert_eq!(arcs.len(), 4);
     assert!(error.to_string().contains("instead of 4"), "{error}");
 }
@@ -372,10 +378,10 @@ fn a_valence_that_contradicts_the_turning_is_named_with_its_region() {
 #[test]
 fn missing_arcs_that_leave_no_disc_are_named() {
     let all = error(|f| f.arcs.clear());
-    assert!(matches!(all, DrawError::Isolated { node: 0 }), "{all}");
+    assert!(matches!(all, PartialEmbeddingError::Isolated { node: 0 }), "{all}");
     // Two opposite sides of the cube: between them is a ring.
     let ring = error(|f| f.arcs.retain(|a| a.ends[0].node / 4 == a.ends[1].node / 4));
-    let DrawError::NotADisc { arcs, .. } = &ring else { panic!("{ring}") };
+    let PartialEmbeddingError::NotADisc { arcs, .. } = &ring else { panic!("{ring}") };
     assert_eq!(arcs.len(), 8);
 }
 
@@ -399,10 +405,10 @@ fn crossing_arcs_are_named() {
         file.arcs.push(FileArc { ends, fixed: false, path: path(curve) });
     }
     let both = file.draw(&mesh).unwrap_err();
-    assert!(matches!(both, DrawError::Cross { first: 0, second: 1, .. }), "{both}");
+    assert!(matches!(both, PartialEmbeddingError::Cross { first: 0, second: 1, .. }), "{both}");
     // One of them alone parts the square; its two halves have two corners too few.
     file.arcs.pop();
-    assert!(matches!(file.draw(&mesh).unwrap_err(), DrawError::Turning { .. }));
+    assert!(matches!(file.draw(&mesh).unwrap_err(), PartialEmbeddingError::Turning { .. }));
 }
 
 #[test]
@@ -477,17 +483,17 @@ fn arcs_at_the_boundary_have_slots_that_say_so() {
     };
     // To the next corner but across other nodes.
     let across = error(&|f| only(f, [end(corners[0], 0), end(corners[1], 1)], &[]));
-    assert_eq!(across, DrawError::OffBoundary { arc: 0 });
+    assert_eq!(across, PartialEmbeddingError::OffBoundary { arc: 0 });
     // With the slots of a boundary arc, but through the interior.
     let inside = error(&|f| only(f, [end(corners[0], 0), end(corners[2], 1)], &[10, 20, 30, 40, 50, 60, 70]));
-    assert_eq!(inside, DrawError::OffBoundary { arc: 0 });
+    assert_eq!(inside, PartialEmbeddingError::OffBoundary { arc: 0 });
     // Along the boundary with other slots.
     let along = error(&|f| {
         f.nodes.retain(|n| n.at == at_vertex(&mesh, VertexId(0)) || n.at == at_vertex(&mesh, VertexId(8)));
         f.nodes.iter_mut().for_each(|n| n.valence = 2);
         only(f, [end(0, 1), end(1, 1)], &[1, 2, 3, 4, 5, 6, 7]);
     });
-    assert_eq!(along, DrawError::OnBoundary { arc: 0 });
+    assert_eq!(along, PartialEmbeddingError::OnBoundary { arc: 0 });
 }
 
 #[test]
@@ -514,7 +520,7 @@ fn drawings_with_arcs_missing_determine_a_field() {
             let drawing = file.draw(mesh).unwrap();
             let (layout, embedding) = drawing.to_embedding().unwrap();
             // It checks the index of every vertex.
-            Net::new(mesh, &embedding, &layout, &drawing.arc_headings()).unwrap();
+            EmbeddingTopology::new(mesh, &embedding, &layout, &drawing.arc_headings()).unwrap();
             let spare = (0..file.arcs.len()).find(|&a| {
                 let mut fewer = file.clone();
                 fewer.arcs.remove(a);
@@ -548,7 +554,7 @@ proptest! {
                 check(&second);
                 prop_assert_eq!(second.regions.len(), drawing.regions.len());
             }
-            Err(e) => prop_assert!(matches!(e, DrawError::NotADisc { .. } | DrawError::Isolated { .. }), "{e}"),
+            Err(e) => prop_assert!(matches!(e, PartialEmbeddingError::NotADisc { .. } | PartialEmbeddingError::Isolated { .. }), "{e}"),
         }
     }
 

@@ -7,7 +7,7 @@
 
 use glam::DVec2;
 
-use super::{Injective, InjectiveEnergy, NewtonSystem, SAFE, first_flat};
+use super::{InjectiveEnergy, InjectiveMap, NewtonSystem, SAFE, first_flat};
 use crate::mesh::{FaceId, TriMesh};
 use crate::param::solve::SeamlessSystem;
 use crate::param::{ParamError, folds, gradients};
@@ -37,7 +37,7 @@ impl SeamlessSystem {
         (newton, energy): (&NewtonSystem, &InjectiveEnergy<'_>),
         (angle, uv): (&[f64], &[[DVec2; 3]]),
         progress: &Progress,
-    ) -> Result<Result<Injective, Vec<FaceId>>, ParamError> {
+    ) -> Result<Result<InjectiveMap, Vec<FaceId>>, ParamError> {
         let wanted = self.differences();
         let found = self.in_parts((mesh, metric), (newton, energy), (angle, uv), &wanted, progress);
         self.set_differences(&wanted)?;
@@ -51,7 +51,7 @@ impl SeamlessSystem {
         (angle, uv): (&[f64], &[[DVec2; 3]]),
         wanted: &[f64],
         progress: &Progress,
-    ) -> Result<Result<Injective, Vec<FaceId>>, ParamError> {
+    ) -> Result<Result<InjectiveMap, Vec<FaceId>>, ParamError> {
         let values = self.values_of(mesh, uv);
         let mut now = self.differences_at(&values);
         self.set_differences(&now)?;

@@ -1,10 +1,10 @@
 //! The energy of a triangle per area, as a function of the matrix of its map.
 
-use super::Shape;
+use super::DistortionWeights;
 
 /// What the energy depends on besides the matrix.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Density {
+pub(crate) struct EnergyDensity {
     /// `ρ`.
     anisotropy: f64,
     /// `λ`.
@@ -43,9 +43,9 @@ const FLAT: f64 = 1e14;
 /// Sweeps of the Jacobi method: of 4 by 4 matrices it has converged to rounding after five.
 const SWEEPS: usize = 6;
 
-impl Density {
+impl EnergyDensity {
     /// The energy of a triangle in which the gradients are to have the lengths given.
-    pub(crate) fn new(shape: Shape, [a, b]: [f64; 2]) -> Self {
+    pub(crate) fn new(shape: DistortionWeights, [a, b]: [f64; 2]) -> Self {
         Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b, slack: 0.0 }
     }
 
@@ -200,7 +200,7 @@ fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
 mod tests {
     use super::*;
 
-    const DENSITY: Density = Density { anisotropy: 3.0, size: 0.4, determinant: 2.0, slack: 0.0 };
+    const DENSITY: EnergyDensity = EnergyDensity { anisotropy: 3.0, size: 0.4, determinant: 2.0, slack: 0.0 };
 
     #[test]
     fn the_gradient_is_that_of_the_energy() {

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::density::Density;
+use super::density::EnergyDensity;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::param::objective::{Objective, hats};
 use crate::surface::Metric;
@@ -17,17 +17,17 @@ const FLAT: f64 = 1e-14;
 
 /// What a map without folds is to be like.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shape {
+pub struct DistortionWeights {
     /// By how much components across the field count more than those along it: `ρ`, at least 1.
     pub anisotropy: f64,
     /// How much size counts beside shape: `λ`, positive.
     pub size: f64,
 }
 
-impl Shape {
+impl DistortionWeights {
     /// What is wanted where the anisotropy counts by a factor: 0 not at all, 1 as it is.
-    pub(crate) fn at_firmness(self, firmness: f64) -> Self {
-        Self { anisotropy: 1.0 + firmness * (self.anisotropy - 1.0), ..self }
+    pub(crate) fn with_anisotropy_share(self, anisotropy_share: f64) -> Self {
+        Self { anisotropy: 1.0 + anisotropy_share * (self.anisotropy - 1.0), ..self }
     }
 }
 
@@ -53,12 +53,12 @@ pub struct InjectiveEnergy<'a> {
     metric: &'a Metric,
     angle: &'a [f64],
     objective: &'a Objective,
-    shape: Shape,
-    firmness: &'a [f64],
+    shape: DistortionWeights,
+    anisotropy_share: &'a [f64],
     /// For each side of each triangle the coordinate that it is pulled towards an isoline of, and how strongly; empty:
     /// none.
     pulled: Vec<[Option<(u8, f64)>; 3]>,
-    /// For each triangle how far its determinant may be below zero, see [`Density`]; empty: nowhere.
+    /// For each triangle how far its determinant may be below zero, see [`EnergyDensity`]; empty: nowhere.
     slack: Vec<f64>,
 }
 
@@ -69,14 +69,14 @@ impl<'a> InjectiveEnergy<'a> {
         metric: &'a Metric,
         angle: &'a [f64],
         objective: &'a Objective,
-        (shape, firmness): (Shape, &'a [f64]),
+        (shape, anisotropy_share): (DistortionWeights, &'a [f64]),
     ) -> Self {
-        Self { metric, angle, objective, shape, firmness, pulled: Vec::new(), slack: Vec::new() }
+        Self { metric, angle, objective, shape, anisotropy_share, pulled: Vec::new(), slack: Vec::new() }
     }
 
     /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v), each so many times as strongly
     /// as usual.
-    pub fn pulling(mut self, list: &[(HalfedgeId, u8, f64)]) -> Self {
+    pub fn with_isoline_penalties(mut self, list: &[(HalfedgeId, u8, f64)]) -> Self {
         if !list.is_empty() {
             self.pulled = vec![[None; 3]; self.angle.len()];
         }
@@ -105,9 +105,9 @@ impl<'a> InjectiveEnergy<'a> {
         hats(self.metric, self.angle[f], FaceId::new(f))
     }
 
-    fn density(&self, f: usize) -> Density {
-        let share = self.firmness.get(f).copied().unwrap_or(1.0);
-        Density::new(self.shape.at_firmness(share), self.objective.target(FaceId::new(f)))
+    fn density(&self, f: usize) -> EnergyDensity {
+        let share = self.anisotropy_share.get(f).copied().unwrap_or(1.0);
+        EnergyDensity::new(self.shape.with_anisotropy_share(share), self.objective.target(FaceId::new(f)))
             .with_slack(self.slack.get(f).copied().unwrap_or(0.0))
     }
 

@@ -36,9 +36,9 @@ use crate::mesh::HalfedgeId;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::{SolveError, SparseHermitian, SpdSymbolic};
 use crate::surface::Metric;
-pub(crate) use density::Density;
+pub(crate) use density::EnergyDensity;
 use energy::Derivatives;
-pub use energy::{InjectiveEnergy, Shape, folds, gradients};
+pub use energy::{DistortionWeights, InjectiveEnergy, folds, gradients};
 
 /// Share of the way to the first flat triangle that a step may go.
 const SAFE: f64 = 0.8;
@@ -57,7 +57,7 @@ const GROUND: f64 = 1e-9;
 
 /// A map without folds on its way down.
 #[derive(Debug, Clone)]
-pub struct Injective {
+pub struct InjectiveMap {
     /// The map.
     pub map: SeamlessMap,
     /// Its free variables.
@@ -149,10 +149,10 @@ impl SeamlessSystem {
     }
 
     /// A map with its energy; `None` if it folds.
-    pub fn injective(&self, energy: &InjectiveEnergy<'_>, free: Vec<f64>) -> Option<Injective> {
+    pub fn injective(&self, energy: &InjectiveEnergy<'_>, free: Vec<f64>) -> Option<InjectiveMap> {
         let map = self.map(&free);
         let total = energy.of(&map.uv)?;
-        Some(Injective { map, free, energy: total })
+        Some(InjectiveMap { map, free, energy: total })
     }
 
     /// Makes the energy of a map without folds less in at most `steps` steps of Newton's method; tells whether it is as
@@ -165,7 +165,7 @@ impl SeamlessSystem {
         &self,
         newton: &NewtonSystem,
         energy: &InjectiveEnergy<'_>,
-        at: &mut Injective,
+        at: &mut InjectiveMap,
         steps: usize,
         progress: &Progress,
     ) -> Result<bool, Cancelled> {
@@ -198,7 +198,13 @@ impl SeamlessSystem {
 
     /// Goes along a direction as far as it makes the energy less by enough and nothing folds; tells which share of it that
     /// is, if it does at all.
-    fn search(&self, energy: &InjectiveEnergy<'_>, at: &mut Injective, direction: &[f64], slope: f64) -> Option<f64> {
+    fn search(
+        &self,
+        energy: &InjectiveEnergy<'_>,
+        at: &mut InjectiveMap,
+        direction: &[f64],
+        slope: f64,
+    ) -> Option<f64> {
         if !(slope > 0.0 && slope.is_finite()) {
             return None;
         }

@@ -5,11 +5,11 @@ use glam::{DVec2, DVec3};
 use super::*;
 use crate::field::{CrossField, cross_field};
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::param::Relation;
+use crate::param::CoordinateConstraint;
 use crate::surface::SurfacePoint;
 use crate::testing::square;
 
-const SHAPE: Shape = Shape { anisotropy: 4.0, size: 0.2 };
+const SHAPE: DistortionWeights = DistortionWeights { anisotropy: 4.0, size: 0.2 };
 
 /// A unit square with the field along its sides.
 fn flat() -> (TriMesh, Metric, CrossField) {
@@ -116,9 +116,10 @@ fn a_map_with_folds_is_untangled_and_satisfies_all_that_it_did() {
 fn the_derivatives_are_those_of_the_energy() {
     let (mesh, metric, field) = flat();
     let objective = Objective { lengths: vec![[1.2, 0.8]; mesh.n_faces()], ..Objective::default() };
-    let firmness: Vec<f64> = mesh.faces().map(|f| 0.1 * f64::from(f.0 % 10)).collect();
+    let anisotropy_share: Vec<f64> = mesh.faces().map(|f| 0.1 * f64::from(f.0 % 10)).collect();
     let pulled: Vec<_> = (0..20).map(|k| (HalfedgeId::new(11 * k), (k % 2) as u8, 1.0 + (k % 3) as f64)).collect();
-    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &firmness)).pulling(&pulled);
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &anisotropy_share))
+        .with_isoline_penalties(&pulled);
     let uv = mapped(&mesh, bent);
     for f in [0, 11, 40, 77] {
         let exact = energy.derivatives(f, &uv[f]).gradient;
@@ -151,7 +152,7 @@ fn features_are_pulled_towards_isolines() {
             |h: HalfedgeId| map.uv[h.index() / 3][(h.index() % 3 + 1) % 3].x - map.uv[h.index() / 3][h.index() % 3].x;
         pulled.iter().map(|&(h, ..)| across(h).abs()).fold(0.0, f64::max)
     };
-    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).pulling(&pulled);
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).with_isoline_penalties(&pulled);
     let mut at = system.injective(&energy, free).unwrap();
     let before = off(&at.map);
     let newton = system.newton().unwrap();
@@ -159,7 +160,7 @@ fn features_are_pulled_towards_isolines() {
     let gently = off(&at.map);
     assert!(gently < 0.2 * before, "{gently} {before}");
     let hard: Vec<_> = pulled.iter().map(|&(h, axis, _)| (h, axis, 1e4)).collect();
-    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).pulling(&hard);
+    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).with_isoline_penalties(&hard);
     let mut at = system.injective(&energy, at.free).unwrap();
     system.descend(&newton, &energy, &mut at, 60, &Progress::new()).unwrap();
     assert!(off(&at.map) < 1e-3 * gently, "{} {gently}", off(&at.map));
@@ -171,7 +172,7 @@ fn relations_are_reached_without_folding_or_what_stands_against_them_is_told() {
     let uv = mapped(&mesh, |p| p);
     let face = FaceId(40);
     let corner = |i: usize| SurfacePoint { face, weights: [0, 1, 2].map(|k| f64::from(u8::from(k == i))) };
-    let alike = |i: usize, axis: u8| Relation {
+    let alike = |i: usize, axis: u8| CoordinateConstraint {
         from: corner(i),
         crossed: Vec::new(),
         to: corner((i + 1) % 3),
@@ -182,7 +183,7 @@ fn relations_are_reached_without_folding_or_what_stands_against_them_is_told() {
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
     let origin = uv[0][0];
     let uv: Vec<_> = uv.iter().map(|w| w.map(|p| p - origin)).collect();
-    let reached = |relations: &[Relation]| {
+    let reached = |relations: &[CoordinateConstraint]| {
         let mut system = SeamlessSystem::new(&mesh, &field, &[], relations).unwrap();
         let newton = system.newton().unwrap();
         let from = (&field.angle[..], &uv[..]);

@@ -13,7 +13,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec2;
 
-use super::{Injective, InjectiveEnergy, NewtonSystem};
+use super::{InjectiveEnergy, InjectiveMap, NewtonSystem};
 use crate::mesh::TriMesh;
 use crate::param::folds;
 use crate::param::solve::SeamlessSystem;
@@ -41,8 +41,8 @@ impl SeamlessSystem {
         free: Vec<f64>,
         (mesh, quarters): (&TriMesh, &[u32]),
         progress: &Progress,
-    ) -> Result<Option<Injective>, Cancelled> {
-        let mut at = Injective { map: self.map(&free), free, energy: f64::INFINITY };
+    ) -> Result<Option<InjectiveMap>, Cancelled> {
+        let mut at = InjectiveMap { map: self.map(&free), free, energy: f64::INFINITY };
         let (mut fewest, mut patience) = (usize::MAX, PATIENCE);
         for step in 0..STEPS {
             progress.check()?;

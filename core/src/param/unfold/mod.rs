@@ -87,7 +87,7 @@ pub enum Effort {
 
 /// Why a triangle remains folded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FoldReason {
+pub enum FlipReason {
     /// The triangles at this vertex cannot span its angle, each corner being less than 180°: it needs more triangles.
     HighValence {
         /// The vertex.
@@ -105,11 +105,11 @@ pub enum FoldReason {
 
 /// A triangle that remains folded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fold {
+pub struct FlippedTriangle {
     /// The triangle.
     pub triangle: u32,
     /// Why.
-    pub reason: FoldReason,
+    pub reason: FlipReason,
 }
 
 /// A map with its folds removed as far as possible.
@@ -120,7 +120,7 @@ pub struct Unfolded {
     /// Number of folds before.
     pub folds_before: usize,
     /// Folds that remain, ascending.
-    pub folds: Vec<Fold>,
+    pub folds: Vec<FlippedTriangle>,
     /// The energy before.
     pub energy_before: f64,
     /// The energy now.
@@ -193,7 +193,8 @@ pub fn unfold(
         }
     }
     let remaining = problem.folded(&problem.reduction.expand(&out.y));
-    out.folds = remaining.into_iter().map(|t| Fold { triangle: t, reason: reason(problem, &crowded, t) }).collect();
+    out.folds =
+        remaining.into_iter().map(|t| FlippedTriangle { triangle: t, reason: reason(problem, &crowded, t) }).collect();
     tracing::debug!(before = out.folds_before, after = out.folds.len(), energy_before, out.energy, "folds removed");
     Ok(out)
 }
@@ -208,12 +209,12 @@ fn crowded_vertices(problem: &OrientationProblem, neighbours: &Neighbours) -> BT
     (0..n as u32).map(|v| (v, at(v))).filter(too_few).collect()
 }
 
-fn reason(problem: &OrientationProblem, crowded: &BTreeMap<u32, (u32, u32)>, t: u32) -> FoldReason {
+fn reason(problem: &OrientationProblem, crowded: &BTreeMap<u32, (u32, u32)>, t: u32) -> FlipReason {
     let vertices = problem.triangles[t as usize].vertices;
     if let Some((vertex, &(quarters, triangles))) = vertices.iter().find_map(|v| crowded.get_key_value(v)) {
-        return FoldReason::HighValence { vertex: *vertex, quarters, triangles };
+        return FlipReason::HighValence { vertex: *vertex, quarters, triangles };
     }
-    if local::is_fixed(problem, t) { FoldReason::Fixed } else { FoldReason::NotResolved }
+    if local::is_fixed(problem, t) { FlipReason::Fixed } else { FlipReason::NotResolved }
 }
 
 /// A map and how good it is.

@@ -189,7 +189,7 @@ fn swapped_vertices_are_reported() {
     let pins = [(at(n, 5, 5), DVec2::new(6.0, 5.0)), (at(n, 6, 5), DVec2::new(5.0, 5.0))];
     let (_, out) = removed(&pinned(n, &pins));
     assert!(!out.folds.is_empty() && out.folds.len() <= out.folds_before);
-    assert!(out.folds.iter().all(|f| f.reason == FoldReason::NotResolved));
+    assert!(out.folds.iter().all(|f| f.reason == FlipReason::NotResolved));
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn a_triangle_without_choice_is_told() {
     let n = 8;
     let pins = [(4, 4, 4.0, 4.0), (5, 4, 4.0, 5.0), (5, 5, 5.0, 4.0)];
     let (_, out) = removed(&pinned(n, &pins.map(|(i, j, x, y)| (at(n, i, j), DVec2::new(x, y)))));
-    let fixed = Fold { triangle: 2 * (4 * n + 4), reason: FoldReason::Fixed };
+    let fixed = FlippedTriangle { triangle: 2 * (4 * n + 4), reason: FlipReason::Fixed };
     assert!(out.folds.contains(&fixed), "{:?}", out.folds);
 }
 
@@ -247,7 +247,7 @@ fn folds_go_across_seams_of_quarter_turns() {
 
 #[test]
 fn a_vertex_of_too_high_valence_is_named() {
-    let reason = FoldReason::HighValence { vertex: 0, quarters: 12, triangles: 6 };
+    let reason = FlipReason::HighValence { vertex: 0, quarters: 12, triangles: 6 };
     let (_, out) = removed(&fan(6, 12, 6, &[]));
     assert_eq!(out.folds.len(), 6);
     assert!(out.folds.iter().all(|f| f.reason == reason));

@@ -17,7 +17,7 @@ use glam::DVec3;
 use crate::mesh::{FaceId, TriMesh};
 
 use super::banded::Banded;
-use super::strip::{Side, Strip};
+use super::strip::{Side, TriangleStrip};
 use super::{Alignment, CurveCost, RelaxOptions};
 
 /// Angle step of the differences that differentiate the alignment, in radians: large against rounding, small
@@ -76,7 +76,7 @@ impl<'a> Energy<'a> {
     pub fn new(
         mesh: &'a TriMesh,
         options: &'a RelaxOptions<'a>,
-        strip: &Strip,
+        strip: &TriangleStrip,
         fidelity: Vec<[f64; 3]>,
         bounds: Vec<(f64, f64)>,
     ) -> Self {
@@ -353,7 +353,7 @@ mod tests {
             let options = RelaxOptions { alignment: Some(&q), ..RelaxOptions::default() };
             let curve = if closed { ring(&mesh, 14, 4, 0.3) } else { super::super::testing::upright(&mesh, 14, 9, 5) };
             assert_eq!(curve.check(&mesh), Ok(()));
-            let strip = Strip::new(&curve);
+            let strip = TriangleStrip::new(&curve);
             let n = strip.len();
             let fidelity = (0..n).map(|i| [0.1, 0.2 * i as f64 / n as f64, 0.5]).collect();
             let energy = Energy::new(&mesh, &options, &strip, fidelity, vec![(0.03, 0.97); n]);

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::mesh::{TriMesh, VertexId};
 
 use super::energy::Energy;
-use super::strip::{Side, Strip};
+use super::strip::{Side, TriangleStrip};
 use super::{CurveCost, RelaxOptions, Relaxed, pushed_vertices};
 
 /// Crossings on each side of a vertex that slide when it is tried: about the extent of a bend.
@@ -32,7 +32,7 @@ const WINDOW: usize = 8;
 
 /// The best strip met so far.
 pub(super) struct Best {
-    pub strip: Option<Strip>,
+    pub strip: Option<TriangleStrip>,
     pub cost: CurveCost,
     /// Cost and fidelity.
     merit: f64,
@@ -49,22 +49,22 @@ pub(super) struct Original {
     points: Vec<DVec3>,
     closed: bool,
     /// Points to pass, each with the crossing nearest to it.
-    through: Vec<(DVec3, usize)>,
+    waypoints: Vec<(DVec3, usize)>,
     /// Radius of the tube.
     radius: f64,
 }
 
 impl Original {
     /// Remembers a strip.
-    pub fn new(mesh: &TriMesh, strip: &Strip, options: &RelaxOptions<'_>) -> Self {
+    pub fn new(mesh: &TriMesh, strip: &TriangleStrip, options: &RelaxOptions<'_>) -> Self {
         let edges: f64 = strip.nodes.iter().map(|n| mesh.vector(n.halfedge).length()).sum();
         let points: Vec<DVec3> = (0..strip.len()).map(|i| strip.point(mesh, i)).collect();
         let nearest = |p: DVec3| {
             let distance = |i: &usize| points[*i].distance_squared(p);
             (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
         };
-        let through = options.through.iter().map(|at| at.position(mesh)).map(|p| (p, nearest(p))).collect();
-        Self { points, closed: strip.closed, through, radius: options.tube * edges / strip.len() as f64 }
+        let waypoints = options.waypoints.iter().map(|at| at.position(mesh)).map(|p| (p, nearest(p))).collect();
+        Self { points, closed: strip.closed, waypoints, radius: options.tube * edges / strip.len() as f64 }
     }
 
     /// Slides the crossings of a strip; remembers it if it is the best. Gives how hard they push in the end.
@@ -72,7 +72,7 @@ impl Original {
         &self,
         mesh: &TriMesh,
         options: &RelaxOptions<'_>,
-        strip: &mut Strip,
+        strip: &mut TriangleStrip,
         steps: usize,
         best: &mut Best,
     ) -> Vec<f64> {
@@ -89,7 +89,7 @@ impl Original {
         &self,
         mesh: &'a TriMesh,
         options: &'a RelaxOptions<'a>,
-        strip: &mut Strip,
+        strip: &mut TriangleStrip,
         steps: usize,
     ) -> (Energy<'a>, Vec<f64>) {
         let energy = self.energy(mesh, options, strip);
@@ -105,7 +105,7 @@ impl Original {
         &self,
         mesh: &TriMesh,
         options: &RelaxOptions<'_>,
-        strip: &mut Strip,
+        strip: &mut TriangleStrip,
         pushes: &[f64],
         failed: &mut HashMap<VertexId, f64>,
     ) -> usize {
@@ -120,7 +120,7 @@ impl Original {
             if !other.pass(mesh, (inner, run.1), side, options.t_min) {
                 continue;
             }
-            let merit = |strip: &mut Strip, steps: usize| {
+            let merit = |strip: &mut TriangleStrip, steps: usize| {
                 let (energy, t) = self.descend(mesh, options, strip, steps);
                 energy.value(&t)
             };
@@ -173,13 +173,13 @@ impl Original {
     }
 
     /// Whether the vertex on one side of crossing `i` lies in the tube.
-    pub fn embraces(&self, mesh: &TriMesh, strip: &Strip, i: usize, side: Side) -> bool {
+    pub fn embraces(&self, mesh: &TriMesh, strip: &TriangleStrip, i: usize, side: Side) -> bool {
         let p = mesh.position(strip.end(mesh, i, side));
         self.nearest(p, strip.nodes[i].reference).0.distance(p) <= self.radius
     }
 
     /// The energy of a strip, with the pull back to here; renews the references of its crossings.
-    fn energy<'a>(&self, mesh: &'a TriMesh, options: &'a RelaxOptions<'a>, strip: &mut Strip) -> Energy<'a> {
+    fn energy<'a>(&self, mesh: &'a TriMesh, options: &'a RelaxOptions<'a>, strip: &mut TriangleStrip) -> Energy<'a> {
         let points: Vec<DVec3> = (0..strip.len()).map(|i| strip.point(mesh, i)).collect();
         let lengths: Vec<f64> = (0..strip.n_segments()).map(|j| points[j].distance(points[strip.after(j)])).collect();
         let (mut fidelity, mut bounds) = (Vec::with_capacity(strip.len()), Vec::with_capacity(strip.len()));
@@ -197,7 +197,7 @@ impl Original {
             fidelity.push(square(across(right - foot, tangent), across(left - right, tangent)).map(|x| weight * x));
             bounds.push(if node.held { (node.t, node.t) } else { self.bounds(away, node.t, options.t_min) });
         }
-        for &(p, reference) in &self.through {
+        for &(p, reference) in &self.waypoints {
             self.pull(mesh, options, strip, (p, reference), &mut fidelity);
         }
         Energy::new(mesh, options, strip, fidelity, bounds)
@@ -209,7 +209,7 @@ impl Original {
         &self,
         mesh: &TriMesh,
         options: &RelaxOptions<'_>,
-        strip: &Strip,
+        strip: &TriangleStrip,
         (p, reference): (DVec3, usize),
         fidelity: &mut [[f64; 3]],
     ) {
@@ -244,7 +244,7 @@ impl Original {
     pub fn finish(
         &self,
         mesh: &TriMesh,
-        mut strip: Strip,
+        mut strip: TriangleStrip,
         before: CurveCost,
         after: CurveCost,
         passed: usize,

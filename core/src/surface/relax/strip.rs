@@ -19,7 +19,7 @@ pub(in crate::surface) enum Side {
     Left,
 }
 
-/// One crossing of a [`Strip`].
+/// One crossing of a [`TriangleStrip`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Node {
     /// As in [`Crossing`].
@@ -34,14 +34,14 @@ pub(super) struct Node {
 
 /// A curve in its strip.
 #[derive(Debug, Clone)]
-pub(super) struct Strip {
+pub(super) struct TriangleStrip {
     /// The crossings in order.
     pub nodes: Vec<Node>,
     /// Whether the last is followed by the first.
     pub closed: bool,
 }
 
-impl Strip {
+impl TriangleStrip {
     /// The strip of a checked curve; nothing is held yet.
     pub fn new(curve: &SurfaceCurve) -> Self {
         let node = |(i, c): (usize, &Crossing)| {
@@ -297,7 +297,7 @@ mod tests {
     fn to_a_strip_and_back() {
         let mesh = cylinder(12, 8, 0.1);
         for curve in [ring(&mesh, 12, 4, 0.3), upright(&mesh, 12, 8, 2)] {
-            let strip = Strip::new(&curve);
+            let strip = TriangleStrip::new(&curve);
             let back = strip.curve();
             for (i, (a, b)) in back.crossings.iter().zip(&curve.crossings).enumerate() {
                 assert!(a.halfedge == b.halfedge && (a.t - b.t).abs() < 1e-15);
@@ -310,7 +310,7 @@ mod tests {
     fn passing_there_and_back_restores_the_crossings() {
         let mesh = cylinder(12, 8, 0.1);
         for (curve, ends) in [(ring(&mesh, 12, 4, 0.3), false), (upright(&mesh, 12, 8, 2), true)] {
-            let strip = Strip::new(&curve);
+            let strip = TriangleStrip::new(&curve);
             let mut done = 0;
             for i in 0..strip.len() {
                 for (side, other) in [(Side::Left, Side::Right), (Side::Right, Side::Left)] {
@@ -325,7 +325,7 @@ mod tests {
                     assert_eq!(run.1 + back.1, spokes);
                     assert!(moved.pass(&mesh, back, other, 0.03));
                     assert_eq!(moved.curve().check(&mesh), Ok(()));
-                    let list = |s: &Strip| {
+                    let list = |s: &TriangleStrip| {
                         let mut list: Vec<HalfedgeId> = s.nodes.iter().map(|n| n.halfedge).collect();
                         if s.closed {
                             list.sort();
@@ -344,8 +344,8 @@ mod tests {
     fn nothing_passes_over_a_boundary_or_a_held_crossing() {
         let mesh = cylinder(12, 8, 0.0);
         let low = ring(&mesh, 12, 0, 0.1);
-        let mut strip = Strip::new(&low);
-        let bottom = |s: &Strip, i, side| mesh.is_boundary_vertex(s.end(&mesh, i, side));
+        let mut strip = TriangleStrip::new(&low);
+        let bottom = |s: &TriangleStrip, i, side| mesh.is_boundary_vertex(s.end(&mesh, i, side));
         let i = (0..strip.len()).find(|&i| bottom(&strip, i, Side::Right)).unwrap();
         let run = strip.run(&mesh, i, Side::Right).unwrap();
         assert!(!strip.pass(&mesh, run, Side::Right, 0.03));
@@ -360,7 +360,7 @@ mod tests {
     fn a_window_put_back_changes_nothing() {
         let mesh = cylinder(20, 16, 0.1);
         for curve in [ring(&mesh, 20, 4, 0.3), upright(&mesh, 20, 16, 2)] {
-            let strip = Strip::new(&curve);
+            let strip = TriangleStrip::new(&curve);
             for i in 0..strip.len() {
                 let run = strip.run(&mesh, i, Side::Left).unwrap();
                 let (window, first) = strip.window(&mesh, run, 6).unwrap();

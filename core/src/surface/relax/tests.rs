@@ -52,7 +52,7 @@ fn the_ends_of_a_slanted_curve_slide_over_boundary_vertices() {
     let mesh = cylinder(60, 12, 0.1);
     let strip = upright(&mesh, 60, 12, 9);
     // The same way up, but with both ends led a boundary vertex to the sides.
-    let mut slanted = Strip::new(&strip);
+    let mut slanted = TriangleStrip::new(&strip);
     for (i, side) in [(0, Side::Left), (slanted.len() - 1, Side::Right)] {
         let run = slanted.run(&mesh, i, side).unwrap();
         assert!(slanted.pass(&mesh, run, side, 0.3));
@@ -78,7 +78,7 @@ fn a_curve_passes_the_points_it_is_drawn_through() {
         let face = mesh.face(curve.crossings[i].halfedge);
         let at = SurfacePoint { face, weights: [0.05, 0.05, 0.9] };
         let p = at.position(&mesh);
-        let drawn = relaxed(&mesh, &curve, &RelaxOptions { through: vec![at], ..RelaxOptions::default() });
+        let drawn = relaxed(&mesh, &curve, &RelaxOptions { waypoints: vec![at], ..RelaxOptions::default() });
         let (before, after) = (distance(&free.curve, p), distance(&drawn.curve, p));
         assert!(after < 0.5 * before, "{before} {after}");
         assert!(drawn.after.total < 1.2 * free.after.total, "{} {}", drawn.after.total, free.after.total);

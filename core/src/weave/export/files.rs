@@ -8,20 +8,21 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::embed::{
-    self, Embedded, EmbeddingReport, Headings, Job, Measures, Next, Settings, Snapshot, Surface, headings,
+    self, ArcHeadings, EmbeddingReport, Measures, Next, OptimisedEmbedding, Problem, Settings, Snapshot, Surface,
+    arc_headings,
 };
 use crate::layout::{Embedding, LayoutFile, PatchMap, QuadLayout, map_patches};
-use crate::mesh::{Normalization, TriMesh, write_obj};
+use crate::mesh::{Normalisation, TriMesh, write_obj};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{QuadMesh, Stops, near, whole_counts};
-use crate::surface::second_form;
+use crate::quad::{QuadMesh, Spacing, adaptive_spacing, integer_grid_counts};
+use crate::surface::second_fundamental_form;
 use crate::weave::PinnedParts;
-use crate::weave::embedding::{Drawn, draw};
+use crate::weave::embedding::{InitialLayout, initial_layout};
 use crate::weave::error::WeaveError;
 use crate::weave::export::quads::quads;
 use crate::weave::export::report::{Before, Subject, Times, write_report};
-use crate::weave::mesh_role::Ground;
+use crate::weave::mesh_role::MeshRole;
 use crate::weave::session::Session;
 
 /// How fine the quads are to be.
@@ -45,12 +46,12 @@ pub struct ExportOptions {
     /// Whether dual strips are to be left out that make the layout more irregular and the embedding no better.
     pub simplify: bool,
     /// Whether arcs that want to be shorter than this are to be collapsed.
-    pub collapse: Option<Shortest>,
+    pub collapse: Option<CollapseLength>,
 }
 
 /// The length below which arcs are collapsed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shortest {
+pub enum CollapseLength {
     /// The edge length of the quads.
     Quad,
     /// This one, in units of the file.
@@ -75,17 +76,17 @@ pub type Watch<'a> = &'a mut dyn FnMut(&Snapshot) -> Next;
 
 /// A drawn layout on a surface, as it comes from a session or from a layout file.
 #[derive(Debug, Clone, Copy)]
-pub struct Sketch<'a> {
+pub struct EmbeddingInput<'a> {
     /// The surface.
     pub surface: Surface<'a>,
     /// Where the surface is a proxy: its maps, and the mesh that the quads are to lie on.
     pub proxy: Option<(&'a Proxy, &'a TriMesh)>,
     /// Its place and size in the file.
-    pub units: Normalization,
+    pub units: Normalisation,
     /// The layout, without patches where arcs are missing, and its drawing.
-    pub drawn: &'a Drawn,
+    pub drawn: &'a InitialLayout,
     /// The headings of the arcs' sides in the charts of the regions between them.
-    pub headings: &'a [Headings],
+    pub arc_headings: &'a [ArcHeadings],
     /// What is to stay where it is drawn.
     pub pinned: &'a PinnedParts,
 }
@@ -98,7 +99,7 @@ pub struct Export {
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
     /// The mesh that layout, embedding and maps are on; the quads always lie on that of the design.
-    pub ground: Ground,
+    pub mesh_role: MeshRole,
     /// The maps of its patches.
     pub maps: Vec<PatchMap>,
     /// Its refinement.
@@ -122,28 +123,28 @@ pub fn export(session: &Session, options: &ExportOptions, progress: &Progress) -
 
 fn export_session(
     session: &Session,
-    embedded: Option<&Embedded>,
+    embedded: Option<&OptimisedEmbedding>,
     options: &ExportOptions,
     progress: &Progress,
     watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
-    export_drawn(session, &draw(session, progress)?, embedded, options, progress, watch)
+    export_layout(session, &initial_layout(session, progress)?, embedded, options, progress, watch)
 }
 
-pub(in crate::weave) fn export_drawn(
+pub(in crate::weave) fn export_layout(
     session: &Session,
-    drawn: &Drawn,
-    embedded: Option<&Embedded>,
+    drawn: &InitialLayout,
+    embedded: Option<&OptimisedEmbedding>,
     options: &ExportOptions,
     progress: &Progress,
     watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
     let model = session.model();
-    let sketch = Sketch {
-        surface: model.surface(drawn.ground),
-        proxy: model.proxy.as_ref().map(|p| (p, &*model.loaded.mesh)).filter(|_| drawn.ground == Ground::Proxy),
+    let sketch = EmbeddingInput {
+        surface: model.surface(drawn.mesh_role),
+        proxy: model.proxy.as_ref().map(|p| (p, &*model.loaded.mesh)).filter(|_| drawn.mesh_role == MeshRole::Proxy),
         units: model.loaded.units,
-        headings: &headings(&drawn.layout),
+        arc_headings: &arc_headings(&drawn.layout),
         pinned: &drawn.pinned(&session.design().pins),
         drawn,
     };
@@ -157,14 +158,14 @@ pub(in crate::weave) fn export_drawn(
 /// When cancelled; when a layout with missing arcs cannot be optimised, since only the map completes it; or when the
 /// patches of a drawing cannot be mapped.
 pub fn finish(
-    sketch: &Sketch<'_>,
-    embedded: Option<&Embedded>,
+    sketch: &EmbeddingInput<'_>,
+    embedded: Option<&OptimisedEmbedding>,
     options: &ExportOptions,
     progress: &Progress,
     watch: Watch<'_>,
 ) -> Result<Export, WeaveError> {
-    let Sketch { surface, drawn, headings, pinned, .. } = *sketch;
-    let Drawn { layout, embedding: drawing, ground } = drawn;
+    let EmbeddingInput { surface, drawn, arc_headings, pinned, .. } = *sketch;
+    let InitialLayout { layout, embedding: initial_embedding, mesh_role } = drawn;
     let mut seconds = Times::new();
     let start = Instant::now();
     let edge = edge_length(options.size, sketch);
@@ -176,13 +177,13 @@ pub fn finish(
                 integer: options.integer.then_some(edge),
                 simplify: options.simplify,
                 collapse: options.collapse.map(|shortest| match shortest {
-                    Shortest::Quad => edge,
-                    Shortest::Length(length) => length / sketch.units.scale,
+                    CollapseLength::Quad => edge,
+                    CollapseLength::Length(length) => length / sketch.units.scale,
                 }),
                 ..settings
             };
             let (pinned_nodes, pinned_arcs) = (&pinned.nodes[..], &pinned.arcs[..]);
-            let job = Job { surface, layout, drawing, headings, pinned_nodes, pinned_arcs, settings };
+            let job = Problem { surface, layout, initial_embedding, arc_headings, pinned_nodes, pinned_arcs, settings };
             Some(embed::optimise(&job, progress, watch))
         }
     };
@@ -190,43 +191,45 @@ pub fn finish(
     seconds.insert("embed".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Mapping patches", 0.95);
     let start = Instant::now();
-    let rough = (!layout.patches.is_empty()).then(|| map_patches(layout, drawing, progress));
+    let rough = (!layout.patches.is_empty()).then(|| map_patches(layout, initial_embedding, progress));
     progress.check()?;
-    let mut before = Before::new(drawing, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
+    let mut before = Before::new(initial_embedding, rough.as_ref().and_then(|maps| maps.as_deref().ok()), &surface);
     let kept = optimised.as_ref().and_then(|o| o.as_ref().ok()).filter(|_| embedded.is_none());
     let problem = kept.and_then(|e| no_better(&e.report, before.measures.as_ref()));
     let (layout, embedding, maps, optimised) = match (optimised, rough) {
-        (Some(Ok(_)), Some(Ok(maps))) if problem.is_some() => (layout.clone(), drawing.clone(), maps, problem.map(Err)),
+        (Some(Ok(_)), Some(Ok(maps))) if problem.is_some() => {
+            (layout.clone(), initial_embedding.clone(), maps, problem.map(Err))
+        }
         (Some(Ok(e)), _) => {
-            before.drawing = e.drawing.unwrap_or(before.drawing);
+            before.initial_embedding = e.initial_embedding.unwrap_or(before.initial_embedding);
             (e.layout, e.embedding, e.maps, Some(Ok(e.report)))
         }
         (Some(Err(error)), None) => return Err(error.into()),
         (None, None) => return Err(WeaveError::Incomplete),
         (failed, Some(maps)) => {
             let problem = failed.and_then(Result::err).map(|error| Err(error.to_string()));
-            (layout.clone(), drawing.clone(), maps?, problem)
+            (layout.clone(), initial_embedding.clone(), maps?, problem)
         }
     };
     let done = matches!(optimised, Some(Ok(_)));
     let stops = if done && options.integer && embedded.is_none() {
-        let (counts, off) = whole_counts(&layout, &maps, edge);
+        let (counts, off) = integer_grid_counts(&layout, &maps, edge);
         tracing::debug!(off, "patches of whole quads");
-        Stops::even(&layout, &counts)
+        Spacing::even(&layout, &counts)
     } else {
         let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
         let number = match options.size {
             QuadSize::EdgeLength(_) => area / (edge * edge),
             QuadSize::Count(n) => f64::from(n),
         };
-        let bend = |base: u32, along| second_form(&before.bending[base as usize], along, along).abs();
-        let stops = Stops::on_surface(&layout, &maps, bend, number);
-        near(stops, (&layout, &embedding, &maps), surface.mesh, progress)?
+        let bend = |base: u32, along| second_fundamental_form(&before.bending[base as usize], along, along).abs();
+        let stops = Spacing::curvature_adapted(&layout, &maps, bend, number);
+        adaptive_spacing(stops, (&layout, &embedding, &maps), surface.mesh, progress)?
     };
     let quads = quads(sketch, (&layout, &embedding, &maps), done, &stops, progress)?;
     seconds.insert("refine".to_owned(), start.elapsed().as_secs_f64());
     progress.report("Done", 1.0);
-    Ok(Export { layout, embedding, ground: *ground, maps, quads, optimised, before, seconds })
+    Ok(Export { layout, embedding, mesh_role: *mesh_role, maps, quads, optimised, before, seconds })
 }
 
 /// Why an optimised embedding is no better than the drawing, if so.
@@ -237,7 +240,7 @@ fn no_better(report: &EmbeddingReport, drawn: Option<&Measures>) -> Option<Strin
 }
 
 /// The edge length of quads before patches are mapped, on a surface of bounding-box diagonal 1.
-fn edge_length(size: QuadSize, sketch: &Sketch<'_>) -> f64 {
+fn edge_length(size: QuadSize, sketch: &EmbeddingInput<'_>) -> f64 {
     let mesh = sketch.surface.mesh;
     match size {
         QuadSize::EdgeLength(length) => length / sketch.units.scale,
@@ -251,7 +254,7 @@ impl Export {
     /// # Errors
     ///
     /// The file that could not be written.
-    pub fn write(&self, folder: &Path, units: &Normalization) -> Result<(), WeaveError> {
+    pub fn write(&self, folder: &Path, units: &Normalisation) -> Result<(), WeaveError> {
         let in_file = |ps: &[glam::DVec3]| ps.iter().map(|&p| units.to_file(p)).collect::<Vec<_>>();
         let nodes = &self.quads.positions[..self.quads.n_nodes];
         let corners: Vec<[u32; 4]> = self.layout.patches.iter().map(|p| p.corners).collect();
@@ -263,7 +266,7 @@ impl Export {
     }
 
     /// The triangle mesh with the map of every patch as texture coordinates and one group per patch.
-    fn write_patches(&self, out: &mut impl Write, units: &Normalization) -> std::io::Result<()> {
+    fn write_patches(&self, out: &mut impl Write, units: &Normalisation) -> std::io::Result<()> {
         let mut positions = self.embedding.mesh.positions.clone();
         let ids: Vec<Vec<u32>> = self
             .maps
@@ -308,7 +311,7 @@ impl Export {
 /// The file that could not be written, or cancelled.
 pub fn write_all(
     session: &Session,
-    embedded: Option<&Embedded>,
+    embedded: Option<&OptimisedEmbedding>,
     options: &ExportOptions,
     folder: &Path,
     seconds: Times,
@@ -325,13 +328,13 @@ pub fn write_all(
     }
     // A layout file is about the mesh of the design.
     if let Ok(export) = &result
-        && export.ground == Ground::Design
+        && export.mesh_role == MeshRole::Design
     {
-        let drawing = &export.before.drawing;
-        let (layout, embedding) = (export.layout.clone(), drawing.clone());
-        let pinned = Drawn { layout, embedding, ground: export.ground }.pinned(&design.pins);
+        let initial_embedding = &export.before.initial_embedding;
+        let (layout, embedding) = (export.layout.clone(), initial_embedding.clone());
+        let pinned = InitialLayout { layout, embedding, mesh_role: export.mesh_role }.pinned(&design.pins);
         let mesh = &model.loaded.mesh;
-        let mut file = LayoutFile::from_embedding(design.mesh.clone(), mesh, &export.layout, drawing)?;
+        let mut file = LayoutFile::from_embedding(design.mesh.clone(), mesh, &export.layout, initial_embedding)?;
         file.nodes.iter_mut().zip(pinned.nodes).for_each(|(node, pinned)| node.fixed = pinned);
         file.arcs.iter_mut().zip(pinned.arcs).for_each(|(arc, pinned)| arc.fixed = pinned);
         file.write(&folder.join("layout.layout"))?;

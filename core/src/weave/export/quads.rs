@@ -7,10 +7,12 @@ use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
-use crate::quad::{Held, QuadMesh, Stops, land, mend, quality, refine, scaled_jacobians, smooth};
+use crate::quad::{
+    FeatureConstraint, QuadMesh, Spacing, project, quality, refine, repair_locally, scaled_jacobians, smooth,
+};
 use crate::surface::{SurfacePoint, nearest_in_triangle};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::Sketch;
+use crate::weave::export::files::EmbeddingInput;
 
 /// How near to a sharp edge a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the width that can be
 /// seen.
@@ -25,22 +27,22 @@ const RESOLVED: usize = 8;
 
 /// The refinement of an embedded layout, on the surface.
 pub(in crate::weave) fn quads(
-    sketch: &Sketch<'_>,
+    sketch: &EmbeddingInput<'_>,
     (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
     optimised: bool,
-    stops: &Stops,
+    stops: &Spacing,
     progress: &Progress,
 ) -> Result<QuadMesh, WeaveError> {
     let surface = sketch.surface;
     progress.report("Refining to quads", 0.97);
     let mut quads = refine(layout, embedding, maps, stops);
     if optimised || sketch.proxy.is_some() {
-        land(&mut quads, surface.mesh);
+        project(&mut quads, surface.mesh);
     }
     let mesh = match sketch.proxy {
         Some((proxy, original)) => {
             carry(&mut quads, proxy, original);
-            land(&mut quads, original);
+            project(&mut quads, original);
             original
         }
         None => surface.mesh,
@@ -60,8 +62,8 @@ pub(in crate::weave) fn quads(
             quads.clone_from(&refined);
             smooth(&mut quads, mesh, &held, progress)?;
         }
-        let on_line = |p, f| is_on_feature(p, f, &surface);
-        mend(&mut quads, mesh, &Held { vertices: &held, on_line: &on_line }, progress)?;
+        let on_feature = |p, f| is_on_feature(p, f, &surface);
+        repair_locally(&mut quads, mesh, &FeatureConstraint { vertices: &held, on_feature: &on_feature }, progress)?;
     }
     Ok(quads)
 }

@@ -8,16 +8,16 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::dual::{Colour, RegionReport};
-use crate::embed::{CollapsedChord, FeatureEdges, Measures, ShortChord, Surface, measure_patches};
+use crate::embed::{CollapsedChord, FeatureEdges, Measures, Surface, UncollapsedChord, measure_patches};
 use crate::layout::{Embedding, PatchMap};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
-use crate::quad::{farthest, quality};
+use crate::quad::{quality, resampling_error};
 use crate::surface::PrincipalCurvature;
 use crate::surface::face_curvature;
 use crate::weave::design::Strip;
 use crate::weave::error::WeaveError;
 use crate::weave::export::files::{Export, write_file};
-use crate::weave::mesh_role::Ground;
+use crate::weave::mesh_role::MeshRole;
 use crate::weave::proposal::ElasticEnergy;
 use crate::weave::session::Session;
 
@@ -28,7 +28,7 @@ pub type Times = BTreeMap<String, f64>;
 #[derive(Debug, Clone)]
 pub struct Before {
     /// The drawing.
-    pub drawing: Embedding,
+    pub initial_embedding: Embedding,
     /// Its measures, with patches mapped one by one; `None` where that cannot be done.
     pub measures: Option<Measures>,
     /// Principal curvatures of the triangles of the surface.
@@ -36,10 +36,14 @@ pub struct Before {
 }
 
 impl Before {
-    pub(in crate::weave) fn new(drawing: &Embedding, maps: Option<&[PatchMap]>, surface: &Surface<'_>) -> Self {
+    pub(in crate::weave) fn new(
+        initial_embedding: &Embedding,
+        maps: Option<&[PatchMap]>,
+        surface: &Surface<'_>,
+    ) -> Self {
         let bending = face_curvature(surface.mesh, surface.curvature, |_| true);
         let measures = maps.map(|maps| measure_patches(maps, &bending).0);
-        Self { drawing: drawing.clone(), measures, bending }
+        Self { initial_embedding: initial_embedding.clone(), measures, bending }
     }
 }
 
@@ -148,7 +152,7 @@ struct Course {
     folds: Vec<FoldSection>,
     /// Chords that were collapsed, in order, and those that were to be and could not be.
     collapsed: Vec<CollapsedChord>,
-    short: Vec<ShortChord>,
+    short: Vec<UncollapsedChord>,
     /// Edges of features, and which of them do not lie on isolines.
     features: FeatureEdges,
 }
@@ -190,7 +194,7 @@ pub(in crate::weave) fn write_report(
 ) -> Result<(), WeaveError> {
     let (loaded, topology, weaving) = match subject {
         Subject::Session(session) => {
-            let on_proxy = result.as_ref().is_ok_and(|e| e.ground == Ground::Proxy);
+            let on_proxy = result.as_ref().is_ok_and(|e| e.mesh_role == MeshRole::Proxy);
             (&session.model().loaded, &session.model().topology, Some(weaving_report(session, on_proxy)))
         }
         Subject::File(loaded, topology) => (loaded, topology, None),
@@ -262,7 +266,7 @@ fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
         quads: e.quads.quads.len(),
         folded_quads,
         mean_scaled_jacobian,
-        farthest_quad: farthest(&e.quads, &loaded.mesh),
+        farthest_quad: resampling_error(&e.quads, &loaded.mesh),
         flipped_triangles,
         embedding: embedding_section(e, loaded),
         checks,
@@ -282,7 +286,7 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
         flipped_at_rest: r.flipped_at_rest,
         folds: r.folds.iter().map(|f| FoldSection { at: in_file(f.at), reason: f.reason.clone() }).collect(),
         collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
-        short: r.short.iter().map(|c| ShortChord { length: c.length * scale, ..c.clone() }).collect(),
+        short: r.short.iter().map(|c| UncollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
         features: FeatureEdges { off: r.features.off.iter().map(|ends| ends.map(in_file)).collect(), ..r.features },
     });
     let patch = |p: &crate::embed::PatchMeasures| PatchSection {

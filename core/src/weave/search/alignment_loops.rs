@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
-use crate::field::{CrossField, Guides, shape_field};
+use crate::field::{AlignmentDirections, CrossField, feature_aligned_field};
 use crate::mesh::{TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::surface::Metric;
@@ -29,13 +29,13 @@ const FIRMEST: f64 = 4.0;
 const PULL: f64 = 300.0;
 
 /// A shape's smooth cross field, and the graph of loops along it.
-pub(in crate::weave) struct Guidance {
+pub(in crate::weave) struct AlignmentGraph {
     pub graph: ElasticaGraph,
     /// One of the four directions of the field at each vertex.
     cross: Vec<[DVec3; 2]>,
 }
 
-impl Guidance {
+impl AlignmentGraph {
     /// `None` where there is no such field: loops do without it.
     pub(in crate::weave) fn new(model: &Model, progress: &Progress) -> Result<Option<Self>, Cancelled> {
         let found = Self::along_field(model, progress);
@@ -73,8 +73,8 @@ fn smooth_field(model: &Model, metric: &Metric, progress: &Progress) -> Result<C
     let mean = (sum / area).max(f64::MIN_POSITIVE);
     let weights: Vec<f64> = anisotropy.iter().map(|w| (w / mean).min(FIRMEST)).collect();
     let directions: Vec<DVec3> = bending.iter().map(|c| c.d_max).collect();
-    let guides = Guides { directions: &directions, weights: &weights, radius: RADIUS };
-    Ok(shape_field(mesh, metric, Some(guides), &model.sharp, progress)?)
+    let guides = AlignmentDirections { directions: &directions, weights: &weights, radius: RADIUS };
+    Ok(feature_aligned_field(mesh, metric, Some(guides), &model.sharp, progress)?)
 }
 
 /// Two directions at right angles of the field around a vertex.
@@ -108,7 +108,7 @@ mod tests {
     fn loops_keep_to_the_circles_of_a_torus_from_any_point() {
         let loaded = builtin("torus").unwrap();
         let model = Model::prepare(loaded, Options::default(), &Progress::new()).unwrap();
-        let guidance = Guidance::new(&model, &Progress::new()).unwrap().unwrap();
+        let guidance = AlignmentGraph::new(&model, &Progress::new()).unwrap().unwrap();
         let none = DirectionMask::none();
         let (mut alignment, mut length) = (0.0, 0.0);
         for v in (0..model.mesh.n_vertices()).step_by(97).map(VertexId::new) {

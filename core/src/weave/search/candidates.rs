@@ -24,7 +24,7 @@ pub(in crate::weave) fn loops(
     most: usize,
     progress: &Progress,
 ) -> Result<Vec<Proposal>, WeaveError> {
-    graph.prepare(progress)?;
+    graph.prepare_boundary_costs(progress)?;
     let share = queries.len().div_ceil(rayon::current_num_threads()).max(1);
     let found: Vec<Vec<Proposal>> = queries
         .par_chunks(share)

@@ -3,13 +3,13 @@
 use serde::Serialize;
 
 use crate::dual::{Arrangement, Colour, assess};
-use crate::embed::{Job, Settings, foresee, headings};
+use crate::embed::{Problem, Settings, arc_headings, predict_fit};
 use crate::layout::{QuadLayout, embed};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
 use crate::weave::embedding::preferred_nodes;
 use crate::weave::error::WeaveError;
-use crate::weave::mesh_role::Ground;
+use crate::weave::mesh_role::MeshRole;
 use crate::weave::model::Model;
 
 /// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
@@ -41,7 +41,7 @@ pub struct Fit {
     /// Number of irregular nodes.
     pub irregular: usize,
     /// The deviation and what the structure is worth, together: the less, the better.
-    pub price: f64,
+    pub objective: f64,
 }
 
 /// The fit of the layout that curves on the woven mesh of a model make, with its nodes moved so many times, and what every
@@ -62,24 +62,24 @@ pub(in crate::weave) fn fit(
     let red: Vec<u32> = (0..reports.len() as u32).filter(|&r| reports[r as usize].colour == Colour::Red).collect();
     let layout = QuadLayout::dual(&arrangement, &red, mesh.euler_characteristic())?;
     let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &model.sharp, &model.vertex_curvatures);
-    let drawing = embed(&arrangement, &layout, &preferred, progress)?;
-    let ground = if model.proxy.is_some() { Ground::Proxy } else { Ground::Design };
-    let job = Job {
-        surface: model.surface(ground),
+    let initial_embedding = embed(&arrangement, &layout, &preferred, progress)?;
+    let mesh_role = if model.proxy.is_some() { MeshRole::Proxy } else { MeshRole::Design };
+    let job = Problem {
+        surface: model.surface(mesh_role),
         layout: &layout,
-        drawing: &drawing,
-        headings: &headings(&layout),
+        initial_embedding: &initial_embedding,
+        arc_headings: &arc_headings(&layout),
         pinned_nodes: &[],
         pinned_arcs: &[],
         settings: Settings::default(),
     };
-    let foreseen = foresee(&job, steps, progress)?;
+    let foreseen = predict_fit(&job, steps, progress)?;
     let index = |n: &crate::layout::Node| (if n.boundary { 2 } else { 4 }) - n.valence as i32;
     let quarters: i32 = layout.nodes.iter().map(|n| index(n).abs()).sum();
     let beyond = |i: i32| (i - i.clamp(USUAL[0], USUAL[1])).abs();
     let extreme: i32 = layout.nodes.iter().map(|n| beyond(index(n))).sum();
     let patches = layout.patches.len();
-    let price = foreseen.alignment
+    let objective = foreseen.alignment
         + DISTORTION * (foreseen.conformal - 2.0)
         + FOLDS * foreseen.folded
         + PATCH * patches as f64
@@ -91,7 +91,7 @@ pub(in crate::weave) fn fit(
         folded: foreseen.folded,
         patches,
         irregular: layout.n_irregular(),
-        price,
+        objective,
     };
     Ok((fit, foreseen.shares))
 }

@@ -27,7 +27,7 @@ use crate::weave::search::trial::Trial;
 use crate::weave::session::Session;
 
 /// Rounds that usually lead to where further ones gain little.
-pub const ROUNDS: usize = 200;
+pub const IMPROVEMENT_ROUNDS: usize = 200;
 /// Rounds in a row without a change after which no better layout is expected.
 const IDLE: usize = 40;
 /// Triangles of the mesh that layouts are tried on, and how many times as many a mesh has that is given such a proxy; by what
@@ -150,8 +150,8 @@ impl Session {
 
     /// Whether strips make the same of the mesh that the session weaves on as those of a trial of its mesh.
     fn is_like(&self, trial: &Trial, strips: &[Strip]) -> bool {
-        let here = Arrangement::sketch(&self.model().mesh, strips.iter().map(Strip::woven));
-        let there = Arrangement::sketch(&trial.model.mesh, trial.now.curves());
+        let here = Arrangement::unsubdivided(&self.model().mesh, strips.iter().map(Strip::woven));
+        let there = Arrangement::unsubdivided(&trial.model.mesh, trial.now.curves());
         // What cannot be arranged is like nothing: the layout is not taken over, and what was found before stays.
         here.ok().zip(there.ok()).is_some_and(|(here, there)| alike(&here, &there))
     }

@@ -10,7 +10,7 @@ use crate::elastica::DirectionMask;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::surface::{RelaxOptions, SurfaceCurve, relax};
-use crate::weave::error::Stuck;
+use crate::weave::error::NoSuggestion;
 use crate::weave::error::WeaveError;
 use crate::weave::proposal::Proposal;
 use crate::weave::search::candidates::{Query, around, loops};
@@ -51,12 +51,12 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`Stuck`], or cancelled.
+    /// [`NoSuggestion`], or cancelled.
     pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
         let woven = self.woven();
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
-        let Some(&first) = urgent.first() else { return Err(Stuck::Done.into()) };
+        let Some(&first) = urgent.first() else { return Err(NoSuggestion::Done.into()) };
         let open = DirectionMask::none();
         // First where and how strips should go; then in every direction, wherever it is urgent; then also
         // along strips that are there; at last by connectivity alone.
@@ -78,7 +78,7 @@ impl Session {
             }
         }
         let reason = woven.reports[first as usize].findings.first().map(ToString::to_string).unwrap_or_default();
-        Err(Stuck::NoHelp { region: first, reason }.into())
+        Err(NoSuggestion::NoHelp { region: first, reason }.into())
     }
 
     /// Places suggestions until `goal` is reached; returns why not, if it is not.
@@ -86,12 +86,12 @@ impl Session {
     /// # Errors
     ///
     /// When cancelled.
-    pub fn weave_to(&mut self, goal: Goal, progress: &Progress) -> Result<Option<Stuck>, WeaveError> {
+    pub fn weave_to(&mut self, goal: Goal, progress: &Progress) -> Result<Option<NoSuggestion>, WeaveError> {
         loop {
             match self.suggest(goal, progress) {
                 Ok(proposal) => self.place(proposal, progress)?,
-                Err(WeaveError::Stuck(Stuck::Done)) => return Ok(None),
-                Err(WeaveError::Stuck(stuck)) => return Ok(Some(stuck)),
+                Err(WeaveError::NoSuggestion(NoSuggestion::Done)) => return Ok(None),
+                Err(WeaveError::NoSuggestion(stuck)) => return Ok(Some(stuck)),
                 Err(error) => return Err(error),
             };
         }

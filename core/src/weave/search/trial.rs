@@ -18,7 +18,7 @@ use crate::weave::design::{Design, Strip};
 use crate::weave::error::WeaveError;
 use crate::weave::model::Model;
 use crate::weave::proposal::Proposal;
-use crate::weave::search::alignment_loops::Guidance;
+use crate::weave::search::alignment_loops::AlignmentGraph;
 use crate::weave::search::candidates::{Query, around, loops};
 use crate::weave::search::fit::{Fit, fit};
 use crate::weave::session::Session;
@@ -85,7 +85,7 @@ struct Change {
 /// Strips under improvement.
 pub(in crate::weave) struct Trial {
     pub model: Arc<Model>,
-    guidance: Option<Guidance>,
+    guidance: Option<AlignmentGraph>,
     pub now: Layout,
     pub best: Layout,
     random: Random,
@@ -101,10 +101,10 @@ impl Trial {
         };
         let strips: Vec<Tried> = session.design().strips.iter().zip(&design.strips).map(tried).collect();
         let all: Vec<&SurfaceCurve> = strips.iter().map(|s| &s.proposal.curve).collect();
-        let drawn = fit(&model, &all, 0, progress)?.0.price;
+        let drawn = fit(&model, &all, 0, progress)?.0.objective;
         let (fit, shares) = fit(&model, &all, STEPS, progress)?;
         let now = Layout { strips, drawn, shares, fit };
-        let guidance = Guidance::new(&model, progress)?;
+        let guidance = AlignmentGraph::new(&model, progress)?;
         let random = Random(1);
         Ok(Self { model, guidance, best: now.clone(), now, random })
     }
@@ -119,17 +119,19 @@ impl Trial {
         let (candidates, through) = self.candidates(progress)?;
         let changes = self.changes(&candidates, through);
         let drawn = self.fits(&changes, &candidates, 0, progress)?;
-        let pairs = changes.into_iter().zip(drawn).filter_map(|(change, found)| Some((change, found?.0.price)));
-        let mut hopeful: Vec<(Change, f64)> = pairs.filter(|(_, price)| *price < self.now.drawn + NEAR).collect();
+        let pairs = changes.into_iter().zip(drawn).filter_map(|(change, found)| Some((change, found?.0.objective)));
+        let mut hopeful: Vec<(Change, f64)> =
+            pairs.filter(|(_, objective)| *objective < self.now.drawn + NEAR).collect();
         hopeful.sort_by(|a, b| a.1.total_cmp(&b.1));
         hopeful.truncate(LOOKED_INTO);
         let (changes, drawn): (Vec<Change>, Vec<f64>) = hopeful.into_iter().unzip();
         let moved = self.fits(&changes, &candidates, STEPS, progress)?;
         // What is only left out is not to cost anything: else strips would become fewer and fewer.
-        let most = |c: &Change| self.now.fit.price + if c.add.is_empty() { 0.0 } else { tolerance };
+        let most = |c: &Change| self.now.fit.objective + if c.add.is_empty() { 0.0 } else { tolerance };
         let found = changes.into_iter().zip(drawn).zip(moved).filter_map(|(pair, found)| Some((pair, found?)));
-        let allowed = found.filter(|((change, _), (fit, _))| fit.price < most(change));
-        let Some(((change, drawn), (fit, shares))) = allowed.min_by(|a, b| a.1.0.price.total_cmp(&b.1.0.price)) else {
+        let allowed = found.filter(|((change, _), (fit, _))| fit.objective < most(change));
+        let Some(((change, drawn), (fit, shares))) = allowed.min_by(|a, b| a.1.0.objective.total_cmp(&b.1.0.objective))
+        else {
             return Ok(false);
         };
         if let Some(out) = change.out {
@@ -160,7 +162,7 @@ impl Trial {
 
     /// Whether the present layout fits better than the best so far.
     pub(in crate::weave) fn is_best(&self) -> bool {
-        self.now.fit.price < self.best.fit.price - LEAST_GAIN
+        self.now.fit.objective < self.best.fit.objective - LEAST_GAIN
     }
 
     /// The present layout is the best so far, and these are its strips.

@@ -37,7 +37,10 @@ fn strips_that_a_layout_does_not_need_are_left_out_in_one_step_of_the_history() 
     let found = improve(&mut s, FEW);
     let now = found.after.patches;
     assert!((found.before.patches, s.design().strips.len() < 4) == (4, true) && now < 4, "{found:?}");
-    assert!(found.after.price < found.before.price && s.woven().arrangement.crossings.len() == now, "{found:?}");
+    assert!(
+        found.after.objective < found.before.objective && s.woven().arrangement.crossings.len() == now,
+        "{found:?}"
+    );
     let after = s.design().strips.clone();
     s.undo(&Progress::new()).unwrap();
     assert_eq!(s.design().strips, before);
@@ -50,7 +53,7 @@ fn strips_that_wind_are_exchanged_for_such_that_follow_the_shape() {
     let mut s = with_strips(torus(N, N), [column(N, N, 3, true, 0.4), diagonal(N)]);
     let found = improve(&mut s, FEW);
     // The field does not tell one winding from another, since neither turns; the map does.
-    assert!(found.after.price < 0.7 * found.before.price && found.after.alignment < 4.0, "{found:?}");
+    assert!(found.after.objective < 0.7 * found.before.objective && found.after.alignment < 4.0, "{found:?}");
     assert!(s.woven().red().is_empty() && found.after.irregular == 0);
     // What was foreseen comes about.
     let export = export(&s, &ExportOptions::default(), &Progress::new()).unwrap();
@@ -110,11 +113,11 @@ fn a_large_mesh_is_improved_on_a_small_one() {
     let mut s = with_strips(torus(n, n), rows.into_iter().chain([column(n, n, 3, true, 0.4), diagonal(n)]));
     assert!(s.model().mesh.n_faces() > 12_000 && s.model().proxy.is_none());
     let found = improve(&mut s, 2);
-    assert!(found.changes > 0 && found.after.price < found.before.price, "{found:?}");
+    assert!(found.changes > 0 && found.after.objective < found.before.objective, "{found:?}");
     for strip in &s.design().strips {
         strip.curve.check(&s.model().mesh).unwrap();
         assert!(strip.on_proxy.is_none());
     }
-    let layout = draw(&s, &Progress::new()).unwrap().layout;
+    let layout = initial_layout(&s, &Progress::new()).unwrap().layout;
     assert_eq!(layout.patches.len(), found.after.patches);
 }

@@ -6,19 +6,19 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::embedding::draw_as_woven;
-use super::export::files::export_drawn;
+use super::embedding::initial_layout_as_woven;
+use super::export::files::export_layout;
 use super::search::detour;
 use super::*;
 use crate::dual::Colour;
 use crate::embed::Next;
 use crate::layout::LayoutFile;
-use crate::mesh::{LoadedMesh, Normalization, TriMesh, builtin};
+use crate::mesh::{LoadedMesh, Normalisation, TriMesh, builtin};
 use crate::progress::Progress;
 use crate::testing::{grid, square, torus};
 
 fn loaded(mesh: TriMesh) -> LoadedMesh {
-    let units = Normalization { center: DVec3::ZERO, scale: 1.0 };
+    let units = Normalisation { center: DVec3::ZERO, scale: 1.0 };
     LoadedMesh { mesh: mesh.into(), units, repairs: Vec::new(), name: "test".into() }
 }
 
@@ -59,7 +59,7 @@ fn three_suggestions_separate_the_corners_of_a_cube() {
 
     let mesh = &s.model().mesh;
     let source = s.design().mesh.clone();
-    let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.before.drawing).unwrap();
+    let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.before.initial_embedding).unwrap();
     let (again, _) = file.draw(mesh).unwrap().to_embedding().unwrap();
     assert_eq!((again.nodes, again.patches.len()), (export.layout.nodes, 6));
 }
@@ -202,7 +202,7 @@ fn pins_find_their_parts_again_and_follow_undo() {
     let progress = Progress::new();
     let mut s = Session::open(builtin("rounded-cube").unwrap(), source, Options::default(), &progress).unwrap();
     s.weave_to(Goal::Separated, &progress).unwrap();
-    let drawn = draw(&s, &progress).unwrap();
+    let drawn = initial_layout(&s, &progress).unwrap();
     let pins = vec![drawn.node_pin(5).unwrap(), drawn.arc_pin(3).unwrap()];
     s.set_pins(pins.clone());
     let text = serde_json::to_string(s.design()).unwrap();
@@ -236,10 +236,10 @@ fn a_large_mesh_is_woven_on_its_proxy() {
     for p in [DVec3::new(0.4, 0.0, 0.0), DVec3::new(0.0, 0.4, 0.0)] {
         let at = s.model().index.nearest(p);
         let best = s.proposals(at, &progress).unwrap().swap_remove(0);
-        let (mesh, shown) = (&s.model().loaded.mesh, s.model().shown(&best.curve));
-        let passes = shown.iter().map(|q| q.distance(at.position(mesh))).fold(f64::MAX, f64::min);
+        let (mesh, on_design_mesh) = (&s.model().loaded.mesh, s.model().on_design_mesh(&best.curve));
+        let passes = on_design_mesh.iter().map(|q| q.distance(at.position(mesh))).fold(f64::MAX, f64::min);
         assert!(passes < 0.02, "{passes}");
-        assert!(shown.iter().all(|q| s.model().index.nearest(*q).position(mesh).distance(*q) < 1e-9));
+        assert!(on_design_mesh.iter().all(|q| s.model().index.nearest(*q).position(mesh).distance(*q) < 1e-9));
         s.place(best, &progress).unwrap();
     }
     let (design, mesh) = (s.design().clone(), s.model().loaded.mesh.clone());
@@ -296,11 +296,11 @@ fn a_layout_embedded_on_the_proxy_has_its_quads_on_the_mesh() {
             e.quads.positions.iter().map(off).fold(0.0, f64::max)
         };
         let on_mesh = export(&s, &ExportOptions::default(), &progress).unwrap();
-        assert_eq!(on_mesh.ground, Ground::Design);
-        let drawn = draw_as_woven(&s, &progress).unwrap();
-        assert_eq!(drawn.ground, Ground::Proxy);
+        assert_eq!(on_mesh.mesh_role, MeshRole::Design);
+        let drawn = initial_layout_as_woven(&s, &progress).unwrap();
+        assert_eq!(drawn.mesh_role, MeshRole::Proxy);
         let mut watch = |_: &_| Next::Continue;
-        let carried = export_drawn(&s, &drawn, None, &ExportOptions::default(), &progress, &mut watch).unwrap();
+        let carried = export_layout(&s, &drawn, None, &ExportOptions::default(), &progress, &mut watch).unwrap();
         let count = |e: &Export| (e.layout.patches.len(), e.layout.nodes.len(), e.layout.n_irregular());
         assert_eq!(count(&on_mesh), count(&carried));
         assert!(far(&on_mesh) < 1e-9 && far(&carried) < 1e-9, "{} {}", far(&on_mesh), far(&carried));

@@ -8,16 +8,16 @@ use crate::mesh::VertexId;
 
 impl ElasticaGraph {
     /// Cost of the state that is farthest from `v`, by plain Dijkstra over all states: the yardstick for searches.
-    pub fn farthest(&self, v: VertexId) -> f64 {
+    pub fn eccentricity(&self, v: VertexId) -> f64 {
         let mut field = Field::default();
         field.restart(self.n_states());
         for a in self.leaving(v) {
             field.set(a, 0.0, NO_STATE, 0);
             field.push(0.0, a);
         }
-        let mut farthest = 0.0;
+        let mut eccentricity = 0.0;
         while let Some((d, e)) = field.settle(self) {
-            farthest = d;
+            eccentricity = d;
             self.expand(e, |f, step| {
                 if field.improves(f, d + step) {
                     field.set(f, d + step, e, 0);
@@ -25,7 +25,7 @@ impl ElasticaGraph {
                 }
             });
         }
-        f64::from(farthest)
+        f64::from(eccentricity)
     }
 }
 

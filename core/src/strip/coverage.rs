@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::Strip;
+use super::StripCoverage;
 use crate::field::{CrossField, EdgePath, Step, pronounced};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::surface::Metric;
@@ -48,7 +48,7 @@ pub(super) struct Ground<'a> {
 
 /// The strips, and what they cover as in [`super::StripMap`].
 pub(super) struct Conquered {
-    pub strips: Vec<Strip>,
+    pub strips: Vec<StripCoverage>,
     pub covered: Vec<[Option<u32>; 2]>,
     pub stripe: Vec<[[f32; 3]; 2]>,
 }
@@ -69,7 +69,7 @@ pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath]) -> Conquered {
     let mut nearest = vec![[f64::INFINITY; 2]; n];
     let mut out = Conquered { strips: Vec::new(), covered: vec![[None; 2]; n], stripe: vec![[[0.0; 3]; 2]; n] };
     for (i, (path, (bounds, taken))) in paths.iter().zip(results).enumerate() {
-        out.strips.push(Strip { curve: path.curve, bounds, faces: taken.len() });
+        out.strips.push(StripCoverage { curve: path.curve, bounds, faces: taken.len() });
         for (f, family, d) in taken {
             let (f, family) = (f.index(), usize::from(family));
             let far = d.iter().sum::<f64>().abs();

@@ -2,10 +2,10 @@
 //!
 //! Its singularities are where a layout of the shape wants irregular nodes.
 
-use super::cross::{CrossField, along_edges};
-use super::singular::all_singularities;
-use super::smooth::{Pull, interpolate_vectors};
-use super::{FieldError, expect_length, jumps};
+use super::cross_field::{CrossField, along_edges};
+use super::singularities::all_singularities;
+use super::smoothing::{Pull, interpolate_vectors};
+use super::{FieldError, expect_length, period_jumps};
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::c64;
@@ -14,7 +14,7 @@ use glam::DVec3;
 
 /// Directions the field is drawn towards, for instance principal curvature directions.
 #[derive(Debug, Clone, Copy)]
-pub struct Guides<'a> {
+pub struct AlignmentDirections<'a> {
     /// A tangent vector of any length for each triangle; zero for none.
     pub directions: &'a [DVec3],
     /// How much each counts, not negative; 1 is full.
@@ -29,10 +29,10 @@ pub struct Guides<'a> {
 /// # Errors
 ///
 /// See [`FieldError`].
-pub fn shape_field(
+pub fn feature_aligned_field(
     mesh: &TriMesh,
     metric: &Metric,
-    guides: Option<Guides<'_>>,
+    guides: Option<AlignmentDirections<'_>>,
     sharp: &[bool],
     progress: &Progress,
 ) -> Result<CrossField, FieldError> {
@@ -53,7 +53,7 @@ pub fn shape_field(
     let hard = along_edges(mesh, metric, mesh.edges().filter(|&e| held(e)).map(|e| (e, 0.0)));
     let vectors = interpolate_vectors(mesh, metric, &hard, &pull, progress)?;
     let angle: Vec<f64> = vectors.iter().map(|z| z.arg() / 4.0).collect();
-    let jump = jumps::principal(mesh, metric, &angle);
+    let jump = period_jumps::principal(mesh, metric, &angle);
     let singularities = all_singularities(mesh, metric, &angle, &jump);
     Ok(CrossField { angle, jump, singularities })
 }

@@ -36,7 +36,7 @@ impl ElasticaGraph {
     /// # Errors
     ///
     /// When cancelled.
-    pub fn prepare(&self, progress: &Progress) -> Result<(), Cancelled> {
+    pub fn prepare_boundary_costs(&self, progress: &Progress) -> Result<(), Cancelled> {
         self.ways_out(progress).map(|_| ())
     }
 

@@ -55,7 +55,7 @@ impl PolarMap {
 
 /// A traced geodesic.
 #[derive(Debug, Clone)]
-pub struct Trace {
+pub struct GeodesicTrace {
     /// Where it ends.
     pub end: SurfacePoint,
     /// The half-edges it crosses, each of the triangle that is left.
@@ -63,11 +63,11 @@ pub struct Trace {
     /// The first triangle.
     pub first: FaceId,
     /// Whether it was stopped by the boundary before it had its length.
-    pub stopped: bool,
+    pub hit_boundary: bool,
 }
 
 /// Traces from `v` in polar direction `angle` for `length`, stopping at the boundary.
-pub fn straightest(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, length: f64) -> Trace {
+pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, length: f64) -> GeodesicTrace {
     let (start, turn) = PolarMap::new(mesh, metric, v).wedge(angle);
     let first = mesh.face(start);
     let mut face = first;
@@ -93,15 +93,20 @@ pub fn straightest(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, len
             })
             .min_by(|p, q| p.1.total_cmp(&q.1));
         let Some((side, s, t)) = exit else {
-            return Trace { end: point(metric, face, at), crossed, first, stopped: true };
+            return GeodesicTrace { end: point(metric, face, at), crossed, first, hit_boundary: true };
         };
         if s >= left || crossed.len() > mesh.n_faces() {
-            return Trace { end: point(metric, face, at + left * direction), crossed, first, stopped: false };
+            return GeodesicTrace {
+                end: point(metric, face, at + left * direction),
+                crossed,
+                first,
+                hit_boundary: false,
+            };
         }
         let h = mesh.face_halfedges(face)[side];
         let Some(twin) = mesh.twin(h) else {
             let end = corners[side].lerp(corners[(side + 1) % 3], t);
-            return Trace { end: point(metric, face, end), crossed, first, stopped: true };
+            return GeodesicTrace { end: point(metric, face, end), crossed, first, hit_boundary: true };
         };
         left -= s;
         heading += metric.transport(h, twin);
@@ -140,11 +145,11 @@ mod tests {
         let first = mesh.vector(polar.spokes[0].0).truncate().to_angle();
         for k in 0..50 {
             let angle = TAU * (f64::from(k) + 0.3) / 50.0;
-            let trace = straightest(&mesh, &metric, v, angle, 0.4);
+            let trace = trace_geodesic(&mesh, &metric, v, angle, 0.4);
             let want = mesh.position(v) + 0.4 * DVec3::new((angle + first).cos(), (angle + first).sin(), 0.0);
             // The metric is enlarged by a ten-thousandth of an edge.
             assert!(trace.end.position(&mesh).distance(want) < 1e-3, "{k}");
-            assert!(!trace.stopped);
+            assert!(!trace.hit_boundary);
             let last = trace.crossed.last().map_or(trace.first, |&h| mesh.face(mesh.twin(h).unwrap()));
             assert_eq!(last, trace.end.face);
         }
@@ -154,9 +159,9 @@ mod tests {
     fn a_geodesic_stops_at_the_boundary() {
         let mesh = square(8);
         let metric = Metric::new(&mesh);
-        let trace = straightest(&mesh, &metric, VertexId(9 * 4 + 4), 1.0, 10.0);
+        let trace = trace_geodesic(&mesh, &metric, VertexId(9 * 4 + 4), 1.0, 10.0);
         let end = trace.end.position(&mesh);
-        assert!(trace.stopped);
+        assert!(trace.hit_boundary);
         assert!([end.x, end.y, 1.0 - end.x, 1.0 - end.y].iter().any(|d| d.abs() < 1e-6), "{end}");
     }
 
@@ -170,7 +175,7 @@ mod tests {
             .outgoing(v)
             .find(|&h| mesh.vector(h).z.abs() < 1e-9)
             .and_then(|h| PolarMap::new(&mesh, &metric, v).spokes.iter().find(|s| s.0 == h).map(|s| s.1));
-        let trace = straightest(&mesh, &metric, v, along.unwrap() + 1e-9, around * 0.999);
+        let trace = trace_geodesic(&mesh, &metric, v, along.unwrap() + 1e-9, around * 0.999);
         assert!((trace.end.position(&mesh).z - 1.0).abs() < 1e-2);
     }
 }

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::curves::{EdgePath, Step, left_fan};
+use super::edge_paths::{EdgePath, Step, left_fan};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::surface::Metric;
 

@@ -12,8 +12,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::singular::Singularity;
-use super::smooth::edge_weight;
+use super::singularities::Singularity;
+use super::smoothing::edge_weight;
 use super::{CrossField, FieldError, expect_length};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
@@ -24,18 +24,18 @@ use crate::surface::Metric;
 /// guide means the same on every mesh.
 const EQUILATERAL: f64 = 1.732_050_807_568_877_2;
 /// The strength of a guide that holds but for a little slack, as near singularities (thesis, section 6.3.2).
-pub const RELIABLE: f64 = 100.0;
+pub const RELIABLE_PENALTY: f64 = 100.0;
 /// How often guides are rounded and the field solved for again; the guides hardly ever change after the third.
 const ROUNDS: usize = 8;
 
 /// A direction that the field is to take in a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guide {
+pub struct DirectionPenalty {
     /// The triangle.
     pub face: FaceId,
     /// The direction, as an angle from its half-edge 0.
     pub angle: f64,
-    /// How strongly, where an edge between equilateral triangles weighs 1; see [`RELIABLE`].
+    /// How strongly, where an edge between equilateral triangles weighs 1; see [`RELIABLE_PENALTY`].
     pub weight: f64,
     /// Which direction of the cross it is for, 0 to 3 counter-clockwise; `None` for whichever is nearest.
     pub branch: Option<i32>,
@@ -43,7 +43,7 @@ pub struct Guide {
 
 /// A solved field.
 #[derive(Debug, Clone)]
-pub struct GuidedField {
+pub struct GuidingField {
     /// Angle of direction 0 of each triangle, from its half-edge 0; not reduced.
     pub angle: Vec<f64>,
     /// For each guide, which direction of the cross follows it, 0 to 3.
@@ -54,7 +54,7 @@ pub struct GuidedField {
 
 /// The system of a mesh: analysed once, solved for any geometry, jumps and guides.
 #[derive(Debug, Clone)]
-pub struct GuidedSystem {
+pub struct GuidingFieldSystem {
     symbolic: SpdSymbolic,
     /// The component of each triangle.
     component: Vec<u32>,
@@ -63,13 +63,13 @@ pub struct GuidedSystem {
 
 /// One solve: the edges with their weights and the rotations wanted across them, and where the guides want to go.
 struct Work<'a> {
-    system: &'a GuidedSystem,
-    guides: &'a [Guide],
+    system: &'a GuidingFieldSystem,
+    guides: &'a [DirectionPenalty],
     /// The triangles of each inner edge, its weight and `κ + p π/2`.
     edges: Vec<(u32, u32, f64, f64)>,
 }
 
-impl GuidedSystem {
+impl GuidingFieldSystem {
     /// Analyses the triangles of `mesh`, of which only the connectivity is read.
     ///
     /// # Errors
@@ -114,10 +114,10 @@ impl GuidedSystem {
         mesh: &TriMesh,
         metric: &Metric,
         jump: &[i32],
-        guides: &[Guide],
+        guides: &[DirectionPenalty],
         previous: Option<&[f64]>,
         progress: &Progress,
-    ) -> Result<GuidedField, FieldError> {
+    ) -> Result<GuidingField, FieldError> {
         let n = self.component.len();
         expect_length("the mesh of the field", mesh.n_faces(), n)?;
         expect_length("the list of period jumps", jump.len(), mesh.n_edges())?;
@@ -134,7 +134,7 @@ impl GuidedSystem {
             None => work.first(progress)?,
         };
         progress.check()?;
-        let all = |_: &Guide| true;
+        let all = |_: &DirectionPenalty| true;
         let (matrix, factor) = work.factor(all)?;
         let mut lift = work.round(&angle);
         for _ in 0..ROUNDS {
@@ -151,33 +151,33 @@ impl GuidedSystem {
         let energy = work.edges.iter().map(square).sum();
         let branch =
             guides.iter().zip(&lift).map(|(g, &l)| (g.branch.unwrap_or(0) - follow(g, l)).rem_euclid(4)).collect();
-        Ok(GuidedField { angle, branch, energy })
+        Ok(GuidingField { angle, branch, energy })
     }
 }
 
 /// The quarter turns that a lift adds to the angle of direction 0 of a guide of open branch; none for a known one.
-fn follow(guide: &Guide, lift: i64) -> i32 {
+fn follow(guide: &DirectionPenalty, lift: i64) -> i32 {
     if guide.branch.is_some() { 0 } else { lift.rem_euclid(4) as i32 }
 }
 
 /// The turn that a guide leaves open.
-fn period(guide: &Guide) -> f64 {
+fn period(guide: &DirectionPenalty) -> f64 {
     if guide.branch.is_some() { TAU } else { FRAC_PI_2 }
 }
 
 /// The angle of direction 0 that a guide asks for, up to its period.
-fn base(guide: &Guide) -> f64 {
+fn base(guide: &DirectionPenalty) -> f64 {
     guide.angle - f64::from(guide.branch.unwrap_or(0)) * FRAC_PI_2
 }
 
 impl Work<'_> {
     /// Angles to round the first guides from.
     fn first(&self, progress: &Progress) -> Result<Vec<f64>, FieldError> {
-        let none = |_: &Guide| false;
+        let none = |_: &DirectionPenalty| false;
         let (matrix, factor) = self.factor(none)?;
         let lift = vec![0; self.guides.len()];
         let mut angle = factor.solve(&matrix, &self.rhs(&lift, none))?;
-        let known = |g: &Guide| g.branch.is_some();
+        let known = |g: &DirectionPenalty| g.branch.is_some();
         self.turn_towards(&mut angle, known);
         if !self.guides.iter().any(known) || self.guides.iter().all(known) {
             return Ok(angle);
@@ -191,7 +191,7 @@ impl Work<'_> {
 
     /// Turns each component as a whole so that it agrees with its guides best: with those that are `known`, or
     /// if it has none, with all.
-    fn turn_towards(&self, angle: &mut [f64], known: impl Fn(&Guide) -> bool) {
+    fn turn_towards(&self, angle: &mut [f64], known: impl Fn(&DirectionPenalty) -> bool) {
         let mut sums = vec![[c64::new(0.0, 0.0); 2]; self.system.n_components];
         for g in self.guides {
             let off = base(g) - angle[g.face.index()];
@@ -214,7 +214,7 @@ impl Work<'_> {
     }
 
     /// The first triangles of components that no guide among those `used` holds.
-    fn loose(&self, used: impl Fn(&Guide) -> bool) -> impl Iterator<Item = usize> {
+    fn loose(&self, used: impl Fn(&DirectionPenalty) -> bool) -> impl Iterator<Item = usize> {
         let mut held = vec![false; self.system.n_components];
         for g in self.guides.iter().filter(|g| used(g) && g.weight > 0.0) {
             held[self.system.component[g.face.index()] as usize] = true;
@@ -225,7 +225,10 @@ impl Work<'_> {
 
     /// The system with the guides that are `used`. Where none is, one triangle is pulled to the angle 0: as turning
     /// the whole changes nothing else, it gets there exactly.
-    fn factor(&self, used: impl Fn(&Guide) -> bool) -> Result<(SparseHermitian<f64>, SpdFactor<f64>), FieldError> {
+    fn factor(
+        &self,
+        used: impl Fn(&DirectionPenalty) -> bool,
+    ) -> Result<(SparseHermitian<f64>, SpdFactor<f64>), FieldError> {
         let mut diagonal = vec![0.0; self.system.component.len()];
         for g in self.guides.iter().filter(|g| used(g)) {
             diagonal[g.face.index()] += g.weight;
@@ -238,7 +241,7 @@ impl Work<'_> {
         Ok((matrix, factor))
     }
 
-    fn rhs(&self, lift: &[i64], used: impl Fn(&Guide) -> bool) -> Vec<f64> {
+    fn rhs(&self, lift: &[i64], used: impl Fn(&DirectionPenalty) -> bool) -> Vec<f64> {
         let mut rhs = vec![0.0; self.system.component.len()];
         for &(f, g, w, want) in &self.edges {
             rhs[g as usize] += w * want;
@@ -267,7 +270,7 @@ fn matrix(n: usize, edges: &[(u32, u32, f64, f64)], mut diagonal: Vec<f64>) -> S
 }
 
 /// How much a field of these jumps turns against a fixed direction across `h`, not counting its angles; what
-/// [`GuidedField`] calls `κ + p π/2`. Zero on the boundary.
+/// [`GuidingField`] calls `κ + p π/2`. Zero on the boundary.
 fn wanted(mesh: &TriMesh, metric: &Metric, jump: &[i32], h: HalfedgeId) -> f64 {
     let e = mesh.edge(h);
     let first = mesh.halfedge(e);

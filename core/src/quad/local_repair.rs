@@ -30,11 +30,11 @@ const GAIN: f64 = 1e-4;
 const STRAIGHT: f64 = 0.9;
 
 /// What vertices are held on.
-pub struct Held<'a> {
+pub struct FeatureConstraint<'a> {
     /// The vertices that lie on lines; those beyond its end are free.
     pub vertices: &'a [bool],
     /// Whether a place on the surface, in that triangle, lies on a line.
-    pub on_line: &'a (dyn Fn(DVec3, u32) -> bool + 'a),
+    pub on_feature: &'a (dyn Fn(DVec3, u32) -> bool + 'a),
 }
 
 /// Mends the worst quads of a mesh on `base`. Vertices that are held move along their lines only.
@@ -42,7 +42,12 @@ pub struct Held<'a> {
 /// # Errors
 ///
 /// When cancelled; `mesh` is then as before.
-pub fn mend(mesh: &mut QuadMesh, base: &TriMesh, held: &Held<'_>, progress: &Progress) -> Result<(), Cancelled> {
+pub fn repair_locally(
+    mesh: &mut QuadMesh,
+    base: &TriMesh,
+    held: &FeatureConstraint<'_>,
+    progress: &Progress,
+) -> Result<(), Cancelled> {
     let mut around = vec![Vec::new(); mesh.positions.len()];
     for (q, quad) in (0u32..).zip(&mesh.quads) {
         quad.iter().for_each(|&v| around[v as usize].push(q));
@@ -73,7 +78,7 @@ struct Mending<'a> {
     rail: Rail,
     /// The quads around each vertex.
     around: Vec<Vec<u32>>,
-    held: &'a Held<'a>,
+    held: &'a FeatureConstraint<'a>,
 }
 
 impl Mending<'_> {
@@ -118,7 +123,7 @@ impl Mending<'_> {
             return Some((Some(s), p, f));
         }
         let (p, f) = self.ground.follow(wanted, self.mesh.base_face[v as usize]);
-        (p.is_finite() && (!self.is_held(v) || (self.held.on_line)(p, f))).then_some((None, p, f))
+        (p.is_finite() && (!self.is_held(v) || (self.held.on_feature)(p, f))).then_some((None, p, f))
     }
 
     fn is_held(&self, v: u32) -> bool {
@@ -193,8 +198,8 @@ mod tests {
     fn the_worst_quad_becomes_good_enough() {
         let (base, mut mesh) = spoiled();
         assert!(least(&mesh) < 0.5);
-        let held = Held { vertices: &[], on_line: &|_, _| true };
-        mend(&mut mesh, &base, &held, &Progress::new()).unwrap();
+        let held = FeatureConstraint { vertices: &[], on_feature: &|_, _| true };
+        repair_locally(&mut mesh, &base, &held, &Progress::new()).unwrap();
         assert!(least(&mesh) >= POOR, "{}", least(&mesh));
     }
 
@@ -207,9 +212,15 @@ mod tests {
         }
         let x = mesh.positions[12].x;
         let vertices: Vec<bool> = (0..25).map(|k| k % 5 == 2).collect();
-        let on_line = |p: DVec3, _| (p.x - x).abs() < 1e-9;
+        let on_feature = |p: DVec3, _| (p.x - x).abs() < 1e-9;
         let before = least(&mesh);
-        mend(&mut mesh, &base, &Held { vertices: &vertices, on_line: &on_line }, &Progress::new()).unwrap();
+        repair_locally(
+            &mut mesh,
+            &base,
+            &FeatureConstraint { vertices: &vertices, on_feature: &on_feature },
+            &Progress::new(),
+        )
+        .unwrap();
         assert!(least(&mesh) > before + 0.1, "{before} {}", least(&mesh));
         assert!((0..25).filter(|k| k % 5 == 2).all(|k| (mesh.positions[k].x - x).abs() < 1e-9));
     }

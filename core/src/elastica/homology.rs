@@ -15,12 +15,12 @@ use crate::surface::SurfaceCurve;
 
 /// The classes of closed curves on a mesh with marks.
 #[derive(Debug)]
-pub struct LoopClasses {
+pub struct HomologyClasses {
     /// Per edge, for crossing it out of the triangle of its half-edge. Sums wrap.
     weights: Vec<u64>,
 }
 
-impl LoopClasses {
+impl HomologyClasses {
     /// The classes on `mesh`, where no curve may be shifted past one of `marks` or a hole.
     pub fn new(mesh: &TriMesh, marks: impl IntoIterator<Item = VertexId>) -> Self {
         let mut charge = vec![0; mesh.n_vertices()];
@@ -126,7 +126,7 @@ mod tests {
             let mesh = builtin(name).unwrap().mesh;
             let inside = |v: &VertexId| !mesh.is_boundary_vertex(*v);
             let marks: Vec<VertexId> = mesh.vertices().filter(inside).step_by(50).take(5).collect();
-            let classes = LoopClasses::new(&mesh, marks.iter().copied());
+            let classes = HomologyClasses::new(&mesh, marks.iter().copied());
             for v in mesh.vertices().filter(inside) {
                 let spokes = mesh.outgoing(v).filter_map(|h| mesh.twin(h));
                 let sum = spokes.map(|h| classes.weight(&mesh, h)).fold(0, u64::wrapping_add);
@@ -139,15 +139,15 @@ mod tests {
     fn rings_of_a_cylinder_are_one_unless_a_mark_lies_between() {
         let mesh = cylinder(24, 12, 0.0);
         let rings = [3, 5, 9].map(|row| ring(&mesh, 24, row, 0.0));
-        let of = |classes: &LoopClasses| rings.each_ref().map(|r| classes.of(&mesh, r).unwrap());
-        let [low, middle, high] = of(&LoopClasses::new(&mesh, []));
+        let of = |classes: &HomologyClasses| rings.each_ref().map(|r| classes.of(&mesh, r).unwrap());
+        let [low, middle, high] = of(&HomologyClasses::new(&mesh, []));
         assert_eq!((low, low), (middle, high));
         // On a row of vertices between the last two.
         let z = 0.8 * 7.0 / 12.0;
         let mark = mesh.vertices().find(|&v| (mesh.position(v).z - z).abs() < 1e-9);
         assert!(mark.is_some());
-        let [low, middle, high] = of(&LoopClasses::new(&mesh, mark));
+        let [low, middle, high] = of(&HomologyClasses::new(&mesh, mark));
         assert!(low == middle && middle != high);
-        assert_eq!(LoopClasses::new(&mesh, []).of(&mesh, &upright(&mesh, 24, 12, 7)), None);
+        assert_eq!(HomologyClasses::new(&mesh, []).of(&mesh, &upright(&mesh, 24, 12, 7)), None);
     }
 }

@@ -10,10 +10,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use super::curves::EdgePath;
-use super::jumps;
-use super::singular::{Singularity, inner_singularities};
-use super::smooth::{Pull, interpolate_vectors};
+use super::edge_paths::EdgePath;
+use super::period_jumps;
+use super::singularities::{Singularity, inner_singularities};
+use super::smoothing::{Pull, interpolate_vectors};
 use super::{FieldError, expect_length};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
@@ -36,7 +36,7 @@ impl CrossField {
     /// The period jump from the triangle of `h` to the triangle of its twin.
     #[inline]
     pub fn jump_across(&self, mesh: &TriMesh, h: HalfedgeId) -> i32 {
-        jumps::across(mesh, &self.jump, h)
+        period_jumps::across(mesh, &self.jump, h)
     }
 
     /// Direction `branch` (0 to 3, counter-clockwise) of the cross in a triangle, as a unit tangent vector.
@@ -48,7 +48,7 @@ impl CrossField {
     /// counter-clockwise of `h`.
     #[inline]
     pub fn branch_along(&self, metric: &Metric, h: HalfedgeId, lean: f64) -> i32 {
-        jumps::branch_along(metric, &self.angle, h, lean)
+        period_jumps::branch_along(metric, &self.angle, h, lean)
     }
 }
 
@@ -73,8 +73,8 @@ pub fn interpolate(
     let hard = along_edges(mesh, metric, on_path.chain(marked.map(|e| (e, 0.0))));
     let vectors = interpolate_vectors(mesh, metric, &hard, &Pull::default(), progress)?;
     let angle: Vec<f64> = vectors.iter().map(|z| z.arg() / 4.0).collect();
-    let mut jump = jumps::principal(mesh, metric, &angle);
-    jumps::keep_on_branch(mesh, metric, &angle, &mut jump, paths);
+    let mut jump = period_jumps::principal(mesh, metric, &angle);
+    period_jumps::keep_on_branch(mesh, metric, &angle, &mut jump, paths);
     let singularities = inner_singularities(mesh, metric, &angle, &jump);
     Ok(CrossField { angle, jump, singularities })
 }

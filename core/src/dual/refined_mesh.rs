@@ -34,7 +34,7 @@ pub enum Mark {
 /// A drawn path could not be continued: its ends are not joined by the triangles it may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("no way from vertex {from} to vertex {to} through the triangles allowed")]
-pub struct NoRoute {
+pub struct NoPath {
     /// Start vertex.
     pub from: u32,
     /// End vertex.
@@ -142,7 +142,7 @@ impl RefinedMesh {
 
     /// An outgoing half-edge of `v`.
     #[inline]
-    pub fn any_outgoing(&self, v: u32) -> u32 {
+    pub fn vertex_halfedge(&self, v: u32) -> u32 {
         self.vertex_halfedge[v as usize]
     }
 
@@ -170,7 +170,7 @@ impl RefinedMesh {
 
     /// The neighbours of a vertex, counter-clockwise; at the boundary from the target of the boundary half-edge that
     /// leaves it to the origin of the one that arrives.
-    pub fn spokes(&self, v: u32) -> Vec<u32> {
+    pub fn neighbours(&self, v: u32) -> Vec<u32> {
         let outgoing = self.outgoing(v);
         let mut list: Vec<u32> = outgoing.iter().map(|&h| self.target(h)).collect();
         let last = outgoing[outgoing.len() - 1];
@@ -312,15 +312,15 @@ impl RefinedMesh {
     ///
     /// # Errors
     ///
-    /// [`NoRoute`] if the triangles allowed do not join the ends.
-    pub fn draw(
+    /// [`NoPath`] if the triangles allowed do not join the ends.
+    pub fn insert_path(
         &mut self,
         (p, q): (u32, u32),
         mark: Mark,
         allowed: impl Fn(&Self, u32) -> bool,
         barrier: impl Fn(Mark) -> bool,
         plane: impl Fn(&Self, u32) -> DVec2,
-    ) -> Result<Vec<u32>, NoRoute> {
+    ) -> Result<Vec<u32>, NoPath> {
         if let Some(h) = self.find(p, q)
             && self.mark(h) == Mark::Free
             && (allowed(self, h / 3) || self.twin(h).is_some_and(|t| allowed(self, t / 3)))
@@ -328,7 +328,7 @@ impl RefinedMesh {
             self.set_mark(h, mark);
             return Ok(vec![p, q]);
         }
-        let crossed = self.route((p, q), allowed, barrier, &plane).ok_or(NoRoute { from: p, to: q })?;
+        let crossed = self.route((p, q), allowed, barrier, &plane).ok_or(NoPath { from: p, to: q })?;
         let (start, end) = (plane(self, p), plane(self, q));
         let mut path = vec![p];
         for h in crossed {
@@ -338,7 +338,7 @@ impl RefinedMesh {
         }
         path.push(q);
         for w in path.windows(2) {
-            let h = self.find(w[0], w[1]).ok_or(NoRoute { from: w[0], to: w[1] })?;
+            let h = self.find(w[0], w[1]).ok_or(NoPath { from: w[0], to: w[1] })?;
             self.set_mark(h, mark);
         }
         Ok(path)
@@ -426,10 +426,10 @@ impl RefinedMesh {
 
     /// The number of marked edges at `v`.
     pub fn marked_degree(&self, v: u32) -> usize {
-        let spokes = self.outgoing(v);
-        let last = spokes.last().map_or(NONE, |&h| prev(h));
+        let neighbours = self.outgoing(v);
+        let last = neighbours.last().map_or(NONE, |&h| prev(h));
         let closing = usize::from(last != NONE && self.is_boundary(last) && self.mark(last) != Mark::Free);
-        spokes.iter().filter(|&&h| self.mark(h) != Mark::Free).count() + closing
+        neighbours.iter().filter(|&&h| self.mark(h) != Mark::Free).count() + closing
     }
 
     /// The id of an original vertex, if `v` is one; `n_base` is the number of original vertices.

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::refined::{Mark, NoRoute, RefinedMesh, prev};
-use super::slots::{self, ChordEnd};
+use super::refined_mesh::{Mark, NoPath, RefinedMesh, prev};
+use super::slot_choice::{self, ChordEnd};
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh};
 use crate::surface::SurfaceCurve;
 
@@ -48,11 +48,11 @@ impl<'m> CurveInserter<'m> {
     ///
     /// # Errors
     ///
-    /// [`NoRoute`] if the curve does not lie on the mesh; check it first.
-    pub(crate) fn insert(&mut self, curve: &SurfaceCurve, index: u32) -> Result<(), NoRoute> {
+    /// [`NoPath`] if the curve does not lie on the mesh; check it first.
+    pub(crate) fn insert(&mut self, curve: &SurfaceCurve, index: u32) -> Result<(), NoPath> {
         let n = curve.crossings.len();
         let mut vertices = Vec::with_capacity(n);
-        let places = slots::choose(self.base, curve, |h| self.taken(h), |f| self.chords_in(f));
+        let places = slot_choice::choose(self.base, curve, |h| self.taken(h), |f| self.chords_in(f));
         for (c, t) in curve.crossings.iter().zip(places) {
             vertices.push(self.insert_on_edge(c.halfedge, t)?);
         }
@@ -61,7 +61,7 @@ impl<'m> CurveInserter<'m> {
             let exit = curve.crossings[i].halfedge;
             let face = self.base.face(exit);
             let plane = FacePlane::new(self.base.face_vertices(face).map(|v| self.base.position(v)));
-            self.refined.draw(
+            self.refined.insert_path(
                 ends,
                 Mark::Curve(index),
                 |mesh, f| mesh.base_face(f) == face.0,
@@ -93,7 +93,7 @@ impl<'m> CurveInserter<'m> {
     }
 
     /// A new vertex at fraction `t` of half-edge `h` of the original mesh.
-    fn insert_on_edge(&mut self, h: HalfedgeId, t: f64) -> Result<u32, NoRoute> {
+    fn insert_on_edge(&mut self, h: HalfedgeId, t: f64) -> Result<u32, NoPath> {
         let edge: EdgeId = self.base.edge(h);
         let along = if self.base.halfedge(edge) == h { t } else { 1.0 - t };
         let [from, to] = self.base.edge_vertices(edge);
@@ -102,7 +102,7 @@ impl<'m> CurveInserter<'m> {
         let (low, before) = if place == 0 { (0.0, from.0) } else { list[place - 1] };
         let (high, after) = list.get(place).copied().unwrap_or((1.0, to.0));
         let at = if along - low < GAP || high - along < GAP { 0.5 * (low + high) } else { along };
-        let sub = self.sub_edge(before, after, edge).ok_or(NoRoute { from: before, to: after })?;
+        let sub = self.sub_edge(before, after, edge).ok_or(NoPath { from: before, to: after })?;
         let fraction = ((at - low) / (high - low)).clamp(0.01, 0.99);
         let fraction = if self.refined.origin(sub) == before { fraction } else { 1.0 - fraction };
         let x = self.refined.split_edge(sub, fraction);

@@ -39,7 +39,7 @@ const ROUNDS: usize = 20;
 
 /// For each chord of a layout the lines along it.
 #[derive(Debug, Clone)]
-pub struct Stops {
+pub struct Spacing {
     /// Of each chord the places of the lines as shares of its width, ascending, without 0 and 1.
     of_chord: Vec<Vec<f64>>,
     /// Whether each arc runs across its chord in the direction that these are measured in.
@@ -48,7 +48,7 @@ pub struct Stops {
     chord: Vec<u32>,
 }
 
-impl Stops {
+impl Spacing {
     /// So many quads across every chord at even steps of the map.
     pub fn even(layout: &QuadLayout, counts: &[u32]) -> Self {
         Self::new(layout, directions(layout), &vec![vec![1.0; PARTS]; counts.len()], counts)
@@ -56,7 +56,12 @@ impl Stops {
 
     /// About so many quads in all, of edges as short on the surface as can be, above all where and along which it bends:
     /// `bend` is how sharply it does, as curvature, at a triangle of the original mesh in a direction.
-    pub fn on_surface(layout: &QuadLayout, maps: &[PatchMap], bend: impl Fn(u32, DVec3) -> f64, quads: f64) -> Self {
+    pub fn curvature_adapted(
+        layout: &QuadLayout,
+        maps: &[PatchMap],
+        bend: impl Fn(u32, DVec3) -> f64,
+        quads: f64,
+    ) -> Self {
         let agrees = directions(layout);
         let parts = spread(layout, maps, &bend, &agrees);
         let density: Vec<Vec<f64>> = parts.iter().map(|parts| densities(parts)).collect();
@@ -121,7 +126,7 @@ impl Stops {
 
 /// The number of quads across every chord where all chords are multiples of `edge` in the maps, and by what share of an
 /// edge some chord is off at most.
-pub fn whole_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
+pub fn integer_grid_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
     let mut counts = vec![1; layout.chords];
     let mut off = 0.0f64;
     for (p, map) in layout.patches.iter().zip(maps) {

@@ -1,6 +1,6 @@
 //! Lines of quads where the surface needs them: nowhere far from it.
 //!
-//! Lines that make edges short on average ([`super::Stops::on_surface`]) leave a few quads at tips and in hollows that are
+//! Lines that make edges short on average ([`super::Spacing::curvature_adapted`]) leave a few quads at tips and in hollows that are
 //! far from the surface, since a line there runs along a whole strip. Yet it is these that are seen. So the refinement is
 //! measured, lines become denser where its edges are farthest from the surface and fewer elsewhere, and again; the lines
 //! are taken with which the farthest edge is nearest.
@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::ground::Ground;
 use super::refine::{QuadMesh, refine};
-use super::smooth::land;
-use super::stops::Stops;
+use super::smooth::project;
+use super::spacing::Spacing;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
@@ -29,19 +29,19 @@ const SHARE: f64 = 0.6;
 /// # Errors
 ///
 /// When cancelled.
-pub fn near(
-    mut stops: Stops,
+pub fn adaptive_spacing(
+    mut stops: Spacing,
     (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
     base: &TriMesh,
     progress: &Progress,
-) -> Result<Stops, Cancelled> {
+) -> Result<Spacing, Cancelled> {
     let ground = Ground::new(base);
-    let mut best: Option<(f64, Stops)> = None;
+    let mut best: Option<(f64, Spacing)> = None;
     let mut wanted = None;
     for round in 0..=ROUNDS {
         progress.check()?;
         let mut quads = refine(layout, embedding, maps, &stops);
-        land(&mut quads, base);
+        project(&mut quads, base);
         let missed = missed(&quads, base);
         let each = quads.quads.par_iter().zip(missed);
         let far: Vec<[f64; 2]> = each.map(|(q, missed)| Distances::of(&quads, q, &ground).sides(missed)).collect();
@@ -59,7 +59,7 @@ pub fn near(
 
 /// How far the quads of a mesh on `base` are from it at most, by the middles of quads and edges and by the vertices of the
 /// surface.
-pub fn farthest(mesh: &QuadMesh, base: &TriMesh) -> f64 {
+pub fn resampling_error(mesh: &QuadMesh, base: &TriMesh) -> f64 {
     let ground = Ground::new(base);
     let far = mesh.quads.par_iter().map(|q| Distances::of(mesh, q, &ground).most()).reduce(|| 0.0, f64::max);
     missed(mesh, base).into_iter().fold(far, f64::max)
@@ -100,7 +100,9 @@ struct Distances {
 impl Distances {
     fn of(mesh: &QuadMesh, quad: &[u32; 4], ground: &Ground<'_>) -> Self {
         let at = |i: usize| mesh.positions[quad[i % 4] as usize];
-        let far = |p: DVec3, near: usize| p.distance(ground.follow(p, mesh.base_face[quad[near] as usize]).0);
+        let far = |p: DVec3, adaptive_spacing: usize| {
+            p.distance(ground.follow(p, mesh.base_face[quad[adaptive_spacing] as usize]).0)
+        };
         Self {
             edges: std::array::from_fn(|i| far(0.5 * (at(i) + at(i + 1)), i)),
             middle: far(0.25 * (at(0) + at(1) + at(2) + at(3)), 0),
@@ -136,13 +138,14 @@ mod tests {
         let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
         let maps = map_patches(&layout, &embedding, &progress).unwrap();
         let drawn = (&layout, &embedding, &maps[..]);
-        let farthest = |stops: &Stops| {
+        let resampling_error = |stops: &Spacing| {
             let mut quads = refine(&layout, &embedding, &maps, stops);
-            land(&mut quads, &mesh);
-            (farthest(&quads, &mesh), quads.quads.len() as f64)
+            project(&mut quads, &mesh);
+            (resampling_error(&quads, &mesh), quads.quads.len() as f64)
         };
-        let first = Stops::on_surface(&layout, &maps, |_, _| 0.0, 300.0);
-        let ((before, n), (after, m)) = (farthest(&first), farthest(&near(first, drawn, &mesh, &progress).unwrap()));
+        let first = Spacing::curvature_adapted(&layout, &maps, |_, _| 0.0, 300.0);
+        let ((before, n), (after, m)) =
+            (resampling_error(&first), resampling_error(&adaptive_spacing(first, drawn, &mesh, &progress).unwrap()));
         assert!(after < 0.7 * before, "{before} {after}");
         assert!((m / n - 1.0).abs() < 0.05, "{n} {m}");
     }

@@ -8,7 +8,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::FRAC_PI_2;
 
-use super::jumps::rest;
+use super::period_jumps::rest;
 use crate::mesh::{TriMesh, VertexId};
 use crate::surface::Metric;
 

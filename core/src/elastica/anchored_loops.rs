@@ -15,9 +15,9 @@
 
 use glam::DVec3;
 
-use super::boundary::{Exit, Exits};
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
+use super::open_curves::{Exit, Exits};
 use super::proposals::Proposals;
 use super::search::{Field, Meter, ROUNDING, Route, SearchWorkspace, Stop};
 use crate::mesh::VertexId;

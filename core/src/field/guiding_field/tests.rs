@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::samples::*;
-use super::super::singular::inner_singularities;
+use super::super::singularities::inner_singularities;
 use super::*;
 use crate::mesh::VertexId;
 use crate::testing::square;
@@ -37,8 +37,14 @@ fn jumps_of(mesh: &TriMesh, metric: &Metric, index: impl Fn(VertexId) -> i32) ->
     jump
 }
 
-fn solve(mesh: &TriMesh, metric: &Metric, jump: &[i32], guides: &[Guide], previous: Option<&[f64]>) -> GuidedField {
-    let system = GuidedSystem::new(mesh).unwrap();
+fn solve(
+    mesh: &TriMesh,
+    metric: &Metric,
+    jump: &[i32],
+    guides: &[DirectionPenalty],
+    previous: Option<&[f64]>,
+) -> GuidingField {
+    let system = GuidingFieldSystem::new(mesh).unwrap();
     system.solve(mesh, metric, jump, guides, previous, &Progress::new()).unwrap()
 }
 
@@ -120,10 +126,10 @@ fn guides_of_open_and_of_known_branch_are_followed() {
     let guide = |k: usize, known: bool| {
         let (f, quarters) = (FaceId::new(5 * k), (7 * k % 4) as i32);
         let angle = along_x[f.index()] + 0.6 + f64::from(quarters) * FRAC_PI_2 + TAU * (k % 3) as f64;
-        Guide { face: f, angle, weight: RELIABLE, branch: known.then_some(quarters) }
+        DirectionPenalty { face: f, angle, weight: RELIABLE_PENALTY, branch: known.then_some(quarters) }
     };
     for known in [0, 1, 20] {
-        let guides: Vec<Guide> = (0..20).map(|k| guide(k, k < known)).collect();
+        let guides: Vec<DirectionPenalty> = (0..20).map(|k| guide(k, k < known)).collect();
         let field = solve(&mesh, &metric, &jump, &guides, None);
         assert!(field.energy < 1e-18);
         for (k, (g, b)) in guides.iter().zip(&field.branch).enumerate() {
@@ -139,16 +145,16 @@ fn a_warm_start_keeps_what_was_assigned() {
     let mesh = octasphere(8);
     let metric = Metric::new(&mesh);
     let jump = jumps_of(&mesh, &metric, |v| layouts()[0].iter().any(|l| nearest(&mesh, l.0.normalize()) == v).into());
-    let guides: Vec<Guide> = (0..mesh.n_faces())
+    let guides: Vec<DirectionPenalty> = (0..mesh.n_faces())
         .step_by(7)
-        .map(|f| Guide { face: FaceId::new(f), angle: 0.01 * f as f64, weight: 3.0, branch: None })
+        .map(|f| DirectionPenalty { face: FaceId::new(f), angle: 0.01 * f as f64, weight: 3.0, branch: None })
         .collect();
     let cold = solve(&mesh, &metric, &jump, &guides, None);
     let warm = solve(&mesh, &metric, &jump, &guides, Some(&cold.angle));
     assert_eq!((&cold.angle, &cold.branch), (&warm.angle, &warm.branch));
     // It cannot be worse than with all guides one branch on.
-    let sum = |field: &GuidedField| {
-        let off = |(g, b): (&Guide, &i32)| {
+    let sum = |field: &GuidingField| {
+        let off = |(g, b): (&DirectionPenalty, &i32)| {
             let a = (field.angle[g.face.index()] + f64::from(*b) * FRAC_PI_2 - g.angle) / TAU;
             g.weight * ((a - a.round()) * TAU).powi(2)
         };
@@ -165,7 +171,7 @@ fn a_warm_start_keeps_what_was_assigned() {
 fn components_are_independent_and_bad_input_is_refused() {
     let mesh = cells(&[[0, 0, 0], [3, 0, 0]], 3);
     let metric = Metric::new(&mesh);
-    let system = GuidedSystem::new(&mesh).unwrap();
+    let system = GuidingFieldSystem::new(&mesh).unwrap();
     let corner = |v: VertexId| {
         let p = mesh.position(v) / 0.2;
         i32::from(p.y.fract() == 0.0 && p.z.fract() == 0.0 && (p.x.round() - p.x).abs() < 1e-9)
@@ -178,14 +184,15 @@ fn components_are_independent_and_bad_input_is_refused() {
     let jump: Vec<i32> = inner_edges(&mesh)
         .map(|(h, t)| ((along(mesh.face(t)) - along(mesh.face(h)) - metric.transport(h, t)) / FRAC_PI_2).round() as i32)
         .collect();
-    let guide = Guide { face: FaceId(0), angle: along(FaceId(0)), weight: 1.0, branch: Some(0) };
-    let solve = |jump: &[i32], guides: &[Guide]| system.solve(&mesh, &metric, jump, guides, None, &Progress::new());
+    let guide = DirectionPenalty { face: FaceId(0), angle: along(FaceId(0)), weight: 1.0, branch: Some(0) };
+    let solve =
+        |jump: &[i32], guides: &[DirectionPenalty]| system.solve(&mesh, &metric, jump, guides, None, &Progress::new());
     let field = solve(&jump, &[guide]).unwrap();
     assert!(field.energy < 1e-18);
     assert!((field.angle[0] - guide.angle).abs() < 1e-9);
     let index = indices(&mesh, &metric, &field.angle, &jump);
     assert!(mesh.vertices().all(|v| index[v.index()] == corner(v)));
     assert!(matches!(solve(&jump[1..], &[]), Err(FieldError::WrongLength { .. })));
-    let nan = Guide { angle: f64::NAN, ..guide };
+    let nan = DirectionPenalty { angle: f64::NAN, ..guide };
     assert!(matches!(solve(&jump, &[nan]), Err(FieldError::Solve(_))));
 }

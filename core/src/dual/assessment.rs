@@ -127,7 +127,7 @@ pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
 /// corners (vertex, index in quarters).
 pub fn assess(arrangement: &Arrangement, curvatures: &[f64], corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
     let region_of_vertex = |v: VertexId| {
-        let h = arrangement.refined.any_outgoing(v.0);
+        let h = arrangement.refined.vertex_halfedge(v.0);
         arrangement.region_left_of(h) as usize
     };
     let mut curvature = vec![0.0; arrangement.regions.len()];

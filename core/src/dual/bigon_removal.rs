@@ -32,7 +32,7 @@ struct Piece {
 }
 
 /// Removes the crossings of curves that lie in pairs a few triangles apart; tells how many pairs there were.
-pub fn untangle(mesh: &TriMesh, curves: &mut [SurfaceCurve]) -> usize {
+pub fn remove_bigons(mesh: &TriMesh, curves: &mut [SurfaceCurve]) -> usize {
     let mut removed = 0;
     while removed < MOST
         && let Some([a, b]) = bigon(mesh, curves)
@@ -264,7 +264,7 @@ mod tests {
         let mut curves = [straight, wriggling];
         let before = count(&mesh, &curves);
         assert!(before >= 4 && before.is_multiple_of(2), "{before}");
-        assert_eq!(untangle(&mesh, &mut curves), before / 2);
+        assert_eq!(remove_bigons(&mesh, &mut curves), before / 2);
         assert_eq!(count(&mesh, &curves), 0);
         curves.iter().for_each(|c| c.check(&mesh).expect("a curve"));
         let all: usize = curves.iter().map(|c| c.crossings.len()).sum();
@@ -284,7 +284,7 @@ mod tests {
         let mut curves = [straight, other];
         let before = count(&mesh, &curves);
         assert!(before > 0);
-        untangle(&mesh, &mut curves);
+        remove_bigons(&mesh, &mut curves);
         assert!(count(&mesh, &curves) < 2, "{before}");
         curves.iter().for_each(|c| c.check(&mesh).expect("a curve"));
     }
@@ -300,7 +300,7 @@ mod tests {
         let across = rows.into_iter().find(|&h| count(&mesh, &[straight(first), straight(h)]) % 2 == 1);
         let wriggling = |h: HalfedgeId, by: f64| around(&mesh, h, |k| if k % 3 == 0 { 0.5 - by } else { 0.5 + by });
         let mut curves = [wriggling(first, 0.3), wriggling(across.expect("a row across"), 0.4)];
-        untangle(&mesh, &mut curves);
+        remove_bigons(&mesh, &mut curves);
         assert_eq!(count(&mesh, &curves), 1);
         curves.iter().for_each(|c| c.check(&mesh).expect("a curve"));
     }

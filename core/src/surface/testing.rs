@@ -1,4 +1,4 @@
-//! Meshes and curves for the tests of this room.
+//! Meshes and curves for tests of curves on surfaces.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -7,9 +7,11 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::surface::{Crossing, SurfaceCurve, VertexPath, geodesic_in};
+use crate::surface::curve::{Crossing, SurfaceCurve};
+use crate::surface::geodesic::geodesic_in;
+use crate::surface::vertex_path::VertexPath;
 
-/// A small generator of numbers that look random (an LCG with the constants of Knuth's MMIX).
+/// A pseudo-random number generator (an LCG with the constants of Knuth's MMIX).
 pub struct Random(pub u64);
 
 impl Random {
@@ -25,7 +27,8 @@ impl Random {
     }
 }
 
-/// A grid that closes in `i` and, where `wrap`, in `j`; `place` maps (i / nu, j / nv), shaken by `jitter` cells.
+/// A grid that is periodic in `i` and, where `wrap`, in `j`. `place` maps `(i / nu, j / nv)`, displaced by up to
+/// `jitter` cells.
 fn grid(nu: usize, nv: usize, wrap: bool, jitter: f64, place: impl Fn(f64, f64) -> DVec3) -> TriMesh {
     let mut random = Random(7);
     let rows = if wrap { nv } else { nv + 1 };
@@ -33,8 +36,8 @@ fn grid(nu: usize, nv: usize, wrap: bool, jitter: f64, place: impl Fn(f64, f64) 
     for j in 0..rows {
         for i in 0..nu {
             let inner = wrap || (j > 0 && j < nv);
-            let mut shake = || (random.unit() - 0.5) * 2.0 * jitter;
-            let (du, dv) = (shake(), shake());
+            let mut displacement = || (random.unit() - 0.5) * 2.0 * jitter;
+            let (du, dv) = (displacement(), displacement());
             let v = j as f64 + if inner { dv } else { 0.0 };
             positions.push(place((i as f64 + du) / nu as f64, v / nv as f64));
         }
@@ -63,7 +66,7 @@ pub fn torus(nu: usize, nv: usize, jitter: f64) -> TriMesh {
     })
 }
 
-/// The curve along row `j` of a grid, its crossings shaken by `noise`.
+/// The curve along row `j` of a grid, its parameters displaced by up to `noise`.
 pub fn ring(mesh: &TriMesh, nu: usize, j: usize, noise: f64) -> SurfaceCurve {
     let mut random = Random(11);
     let mut crossings = Vec::new();
@@ -79,7 +82,7 @@ pub fn ring(mesh: &TriMesh, nu: usize, j: usize, noise: f64) -> SurfaceCurve {
     curve
 }
 
-/// The curve up column `i` of a cylinder of `nv` rows, with fixed noise.
+/// The curve along column `i` of a cylinder of `nv` rows, with pseudo-random parameters.
 pub fn upright(mesh: &TriMesh, nu: usize, nv: usize, i: usize) -> SurfaceCurve {
     let mut random = Random(5);
     let mut halfedges = vec![3 * 2 * i];
@@ -93,11 +96,11 @@ pub fn upright(mesh: &TriMesh, nu: usize, nv: usize, i: usize) -> SurfaceCurve {
     curve
 }
 
-/// A closed curve through triangles: a cycle of the dual graph, closed by a random edge over a breadth-first
-/// tree from a random triangle. `None` where that cycle is too short.
+/// A closed curve along a cycle of the dual graph: a random dual edge and its path in a breadth-first tree from a
+/// random triangle. `None` where the cycle is too short.
 pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
     let root = FaceId::new(random.below(mesh.n_faces()));
-    // The half-edge by which the tree enters a triangle's parent.
+    // The half-edge of a triangle's side towards its parent in the tree.
     let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_faces()];
     let mut queue = VecDeque::from([root]);
     while let Some(f) = queue.pop_front() {
@@ -124,7 +127,7 @@ pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
         from.pop();
         to.pop();
     }
-    // Down to h, across it, up again from the other side.
+    // From the common ancestor down to `h`, across it, and up again on the other side.
     let mut halfedges: Vec<HalfedgeId> = from.iter().rev().map(|&h| mesh.twin(h).unwrap()).collect();
     halfedges.push(h);
     halfedges.extend(to);
@@ -133,9 +136,9 @@ pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
     (curve.crossings.len() > 8 && curve.check(mesh).is_ok()).then_some(curve)
 }
 
-/// Algebraic numbers of crossings of a closed curve with `count` closed edge paths, one per random edge over a
-/// breadth-first tree of the vertices: they depend on the homology class alone.
-pub fn class_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<i64> {
+/// Algebraic intersection numbers of a closed curve with `count` closed edge paths, each a random edge and its path in
+/// a breadth-first tree of the vertices. They depend on the homology class of the curve alone.
+pub fn homology_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<i64> {
     let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_vertices()];
     let mut queue = VecDeque::from([VertexId(0)]);
     while let Some(v) = queue.pop_front() {
@@ -152,7 +155,7 @@ pub fn class_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<
         let along = mesh.halfedge(mesh.edge(c.halfedge)) == c.halfedge;
         signed[mesh.edge(c.halfedge).index()] += if along { 1 } else { -1 };
     }
-    // What is crossed on the way up the tree from v, and where the way ends.
+    // The signed crossings on the path from `v` to the root of its tree, and that root.
     let up = |mut v: VertexId| {
         let mut sum = 0;
         while let Some(h) = to_parent[v.index()] {
@@ -173,8 +176,8 @@ pub fn class_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<
     (0..count).map(|_| number()).collect()
 }
 
-/// The closed curve of geodesics from each waypoint to the next, around each waypoint counter-clockwise at a
-/// thousandth of an edge: what a search on a graph of geodesics gives.
+/// The closed curve of geodesics from each waypoint to the next. It passes each waypoint counter-clockwise at a
+/// thousandth of an edge, like the result of a search on a graph of geodesics.
 pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve {
     let next = |k: usize| waypoints[(k + 1) % waypoints.len()];
     let paths: Vec<VertexPath> =
@@ -183,7 +186,7 @@ pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve 
     for (k, path) in paths.iter().enumerate() {
         crossings.extend(path.crossings.iter().copied());
         let goal = mesh.face(paths[(k + 1) % paths.len()].crossings[0].halfedge);
-        // The outgoing half-edge at the waypoint, of the triangle the curve is in.
+        // The outgoing half-edge at the waypoint in the triangle that the curve has reached.
         let mut out = mesh.prev(mesh.twin(path.crossings.last().unwrap().halfedge).unwrap());
         while mesh.face(out) != goal {
             crossings.push(Crossing { halfedge: mesh.prev(out), t: 1.0 - 1e-3 });
@@ -195,7 +198,7 @@ pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve 
     curve
 }
 
-/// A mesh of the folder of real meshes, of bounding-box diagonal 1; `None` where there is none.
+/// A mesh of the folder of test meshes, scaled to bounding-box diagonal 1; `None` where the file is missing.
 pub fn real_mesh(file: &str) -> Option<TriMesh> {
     let folder = std::env::var_os("PLAIT_MESHES")
         .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/meshes")), PathBuf::from);

@@ -1,108 +1,29 @@
-//! Shortest paths between two vertices inside a part of the surface, as lists of crossed edges.
+//! Geodesics between two vertices inside a part of the surface.
 //!
-//! Dijkstra over the midpoints of edges finds a strip of triangles from start to end. Unfolded to the plane, the
-//! strip holds one shortest path, pulled taut by the funnel algorithm (Lee and Preparata 1984); it bends only
-//! at vertices on the rim of the strip. Where the fan of such a vertex on the other side of the path is allowed
-//! and narrower than π, the strip is led around there, which shortens the path (as flipping edges out of the
-//! way does: Sharp and Crane 2020); until no such vertex is left the path is pulled again. The result is a
-//! geodesic of the allowed part, in general the shortest near the one found on midpoints.
-
-mod funnel;
+//! Dijkstra over the midpoints of edges finds a strip of triangles from start to end. The shortest path in this strip,
+//! unfolded to the plane, is found by the funnel algorithm ([`funnel`](super::funnel)); it bends only at vertices of
+//! the strip's boundary. Where the fan of such a vertex on the other side of the path is allowed and narrower than π,
+//! the strip is replaced by that fan, which shortens the path (like the edge flips of Sharp and Crane 2020). This is
+//! repeated until no such vertex is left. The result is a geodesic, locally shortest; a shorter one may exist
+//! elsewhere.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
-use glam::DVec3;
-use serde::{Deserialize, Serialize};
-
+use super::funnel::{Bend, UnfoldedStrip};
+use super::vertex_fan::{Side, spokes_across};
+use super::vertex_path::{VertexPath, joined_by_edge};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
-use super::relax::{Side, spokes_across};
-use super::{Crossing, CurveError};
-use funnel::{Corner, Unfolded};
-
-/// A fan must be narrower than π by this (radians) to be worth a change of strip; far above rounding.
+/// A fan is used only if it is narrower than π by this (radians); far above rounding, so that the loop ends.
 const MIN_BEND: f64 = 1e-7;
-
-/// A path between two vertices that passes no vertex in between.
-///
-/// `start` is the corner opposite to the first half-edge crossed, `end` the corner opposite to the twin of the
-/// last. Without crossings, start and end are joined by a mesh edge, and the path is this edge.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct VertexPath {
-    /// Where the path starts.
-    pub start: VertexId,
-    /// Where it ends.
-    pub end: VertexId,
-    /// The crossings in order, each on the half-edge of the triangle that is left.
-    pub crossings: Vec<Crossing>,
-}
-
-impl VertexPath {
-    /// The points from start to end.
-    pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
-        let at =
-            |c: &Crossing| mesh.position(mesh.origin(c.halfedge)).lerp(mesh.position(mesh.target(c.halfedge)), c.t);
-        let mut points = vec![mesh.position(self.start)];
-        points.extend(self.crossings.iter().map(at));
-        points.push(mesh.position(self.end));
-        points
-    }
-
-    /// Length on the mesh.
-    pub fn length(&self, mesh: &TriMesh) -> f64 {
-        self.points(mesh).windows(2).map(|w| w[0].distance(w[1])).sum()
-    }
-
-    /// The triangles passed, in order; none for a path along an edge.
-    pub fn faces(&self, mesh: &TriMesh) -> Vec<FaceId> {
-        let last = self.crossings.last().and_then(|c| mesh.twin(c.halfedge));
-        self.crossings.iter().map(|c| c.halfedge).chain(last).map(|h| mesh.face(h)).collect()
-    }
-
-    /// Checks that the path lies on `mesh`: known edges, inner parameters, consecutive crossings in one
-    /// triangle, start and end where they belong.
-    ///
-    /// # Errors
-    ///
-    /// The first crossing that violates this; for a path without crossings between vertices that no edge joins,
-    /// [`CurveError::TooShort`].
-    pub fn check(&self, mesh: &TriMesh) -> Result<(), CurveError> {
-        let (Some(first), Some(last)) = (self.crossings.first(), self.crossings.last()) else {
-            let known = self.start.index() < mesh.n_vertices() && self.end.index() < mesh.n_vertices();
-            let joined = known && joining_edge(mesh, self.start, self.end, &|_| true);
-            return if joined { Ok(()) } else { Err(CurveError::TooShort { count: 0 }) };
-        };
-        let mut entered: Option<HalfedgeId> = None;
-        for (crossing, c) in self.crossings.iter().enumerate() {
-            if c.halfedge.index() >= mesh.n_halfedges() {
-                return Err(CurveError::UnknownHalfedge { crossing });
-            }
-            if !(c.t > 0.0 && c.t < 1.0) {
-                return Err(CurveError::OutsideEdge { crossing });
-            }
-            if entered.is_some_and(|e| mesh.face(e) != mesh.face(c.halfedge) || e == c.halfedge) {
-                return Err(CurveError::Disconnected { crossing });
-            }
-            entered = Some(mesh.twin(c.halfedge).ok_or(CurveError::Boundary { crossing })?);
-        }
-        let end = mesh.twin(last.halfedge).map(|h| mesh.opposite(h));
-        if mesh.opposite(first.halfedge) != self.start {
-            return Err(CurveError::Disconnected { crossing: 0 });
-        }
-        if end != Some(self.end) {
-            return Err(CurveError::Disconnected { crossing: self.crossings.len() - 1 });
-        }
-        Ok(())
-    }
-}
 
 /// A geodesic from `start` to `end` through triangles that are `allowed`; `None` if there is none, or if both are
 /// one vertex.
 ///
-/// It passes vertices that it bends around (on the rim of the allowed part, or of more than 2π) at a thousandth
-/// of an edge.
+/// It passes the vertices at which it bends (on the boundary of the allowed part, or with an angle sum of more than 2π)
+/// at a distance of a thousandth of an edge.
 pub fn geodesic_in(
     mesh: &TriMesh,
     start: VertexId,
@@ -112,11 +33,11 @@ pub fn geodesic_in(
     if start == end {
         return None;
     }
-    if joining_edge(mesh, start, end, &allowed) {
+    if joined_by_edge(mesh, start, end, &allowed) {
         return Some(VertexPath { start, end, crossings: Vec::new() });
     }
     let mut strip = midpoint_strip(mesh, start, end, &allowed)?;
-    // Each pass shortens the path, so it ends by itself; the bound is for rounding.
+    // Each pass shortens the path, so the loop ends; the bound is a safeguard against rounding.
     let mut passes = 20 * strip.len() + 100;
     loop {
         trim(mesh, start, end, &mut strip);
@@ -124,21 +45,16 @@ pub fn geodesic_in(
             // One triangle holds both ends.
             return Some(VertexPath { start, end, crossings: Vec::new() });
         }
-        let unfolded = Unfolded::new(mesh, &strip);
-        let corners = unfolded.pull();
-        if passes == 0 || !pass_one(mesh, &mut strip, &unfolded, &corners, &allowed) {
-            return Some(VertexPath { start, end, crossings: unfolded.crossings(&strip, &corners) });
+        let unfolded = UnfoldedStrip::new(mesh, &strip);
+        let bends = unfolded.shortest_path();
+        if passes == 0 || !reroute(mesh, &mut strip, &unfolded, &bends, &allowed) {
+            return Some(VertexPath { start, end, crossings: unfolded.crossings(&strip, &bends) });
         }
         passes -= 1;
     }
 }
 
-/// Whether an edge at an allowed triangle joins two vertices.
-fn joining_edge(mesh: &TriMesh, a: VertexId, b: VertexId, allowed: &impl Fn(FaceId) -> bool) -> bool {
-    mesh.outgoing(a).any(|h| (mesh.target(h) == b || mesh.opposite(h) == b) && allowed(mesh.face(h)))
-}
-
-/// A distance in a queue, ordered as numbers are.
+/// A distance with the total order of [`f64::total_cmp`], for the queue.
 #[derive(PartialEq)]
 struct Distance(f64);
 
@@ -156,20 +72,20 @@ impl Ord for Distance {
     }
 }
 
-/// The half-edges crossed on a shortest way over midpoints.
+/// The half-edges crossed by the shortest path over midpoints of edges.
 fn midpoint_strip(
     mesh: &TriMesh,
     start: VertexId,
     end: VertexId,
     allowed: &impl Fn(FaceId) -> bool,
 ) -> Option<Vec<HalfedgeId>> {
-    let middle = |h| 0.5 * (mesh.position(mesh.origin(h)) + mesh.position(mesh.target(h)));
+    let midpoint = |h| 0.5 * (mesh.position(mesh.origin(h)) + mesh.position(mesh.target(h)));
     let mut distance = vec![f64::INFINITY; mesh.n_halfedges()];
     let mut parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_halfedges()];
     let mut queue = BinaryHeap::new();
     for out in mesh.outgoing(start).filter(|&h| allowed(mesh.face(h))) {
         let h = mesh.next(out);
-        distance[h.index()] = middle(h).distance(mesh.position(start));
+        distance[h.index()] = midpoint(h).distance(mesh.position(start));
         queue.push(Reverse((Distance(distance[h.index()]), h)));
     }
     let mut best: Option<(f64, HalfedgeId)> = None;
@@ -181,13 +97,13 @@ fn midpoint_strip(
             continue;
         };
         if mesh.opposite(entered) == end {
-            let total = d + middle(h).distance(mesh.position(end));
+            let total = d + midpoint(h).distance(mesh.position(end));
             if best.is_none_or(|b| total < b.0) {
                 best = Some((total, h));
             }
         }
         for next in [mesh.next(entered), mesh.prev(entered)] {
-            let there = d + middle(h).distance(middle(next));
+            let there = d + midpoint(h).distance(midpoint(next));
             if there < distance[next.index()] {
                 distance[next.index()] = there;
                 parent[next.index()] = Some(h);
@@ -200,8 +116,8 @@ fn midpoint_strip(
     Some(strip)
 }
 
-/// Takes back what runs to and fro, and cuts off what comes before the last visit to the start and after the
-/// first one to the end.
+/// Removes pairs of crossings of one edge in both directions, then the crossings up to the last edge at the start and
+/// from the first edge at the end.
 fn trim(mesh: &TriMesh, start: VertexId, end: VertexId, strip: &mut Vec<HalfedgeId>) {
     let mut kept: Vec<HalfedgeId> = Vec::with_capacity(strip.len());
     for &h in strip.iter() {
@@ -221,22 +137,23 @@ fn trim(mesh: &TriMesh, start: VertexId, end: VertexId, strip: &mut Vec<Halfedge
     }
 }
 
-/// Leads the strip around the first corner that allows it; `false` where none does.
-fn pass_one(
+/// Replaces the part of the strip at the first bend that allows it by the fan on the other side of the bend; `false` if
+/// no bend does.
+fn reroute(
     mesh: &TriMesh,
     strip: &mut Vec<HalfedgeId>,
-    unfolded: &Unfolded,
-    corners: &[Corner],
+    unfolded: &UnfoldedStrip,
+    bends: &[Bend],
     allowed: &impl Fn(FaceId) -> bool,
 ) -> bool {
-    for (k, c) in corners.iter().enumerate() {
+    for (k, c) in bends.iter().enumerate() {
         let h = strip[c.first];
         let v = if c.side == Side::Left { mesh.target(h) } else { mesh.origin(h) };
         if mesh.is_boundary_vertex(v) {
             continue;
         }
-        let from = if k == 0 { unfolded.start } else { corners[k - 1].point };
-        let to = corners.get(k + 1).map_or(unfolded.end, |c| c.point);
+        let from = if k == 0 { unfolded.start } else { bends[k - 1].point };
+        let to = bends.get(k + 1).map_or(unfolded.end, |c| c.point);
         let total: f64 = mesh.outgoing(v).map(|h| mesh.corner_angle(h)).sum();
         if total - unfolded.swept(c, from, to) > PI - MIN_BEND {
             continue;
@@ -262,18 +179,21 @@ fn pass_one(
 
 #[cfg(test)]
 mod tests {
-    use super::super::relax::testing::{Random, cylinder, real_mesh};
+    use glam::DVec3;
+
+    use super::super::curve::{Crossing, CurveError};
+    use super::super::testing::{Random, cylinder, real_mesh};
     use super::*;
 
-    /// A flat square of `n` by `n` cells, vertices shaken, with random diagonals.
+    /// A flat square of `n` by `n` cells with random diagonals; inner vertices are displaced by up to `jitter` cells.
     fn plane(n: usize, jitter: f64) -> TriMesh {
         let mut random = Random(9);
         let mut positions = Vec::new();
         for j in 0..=n {
             for i in 0..=n {
                 let mut at = |k: usize| {
-                    let shake = 2.0 * jitter * (random.unit() - 0.5);
-                    (k as f64 + if k == 0 || k == n { 0.0 } else { shake }) / n as f64
+                    let displacement = 2.0 * jitter * (random.unit() - 0.5);
+                    (k as f64 + if k == 0 || k == n { 0.0 } else { displacement }) / n as f64
                 };
                 positions.push(DVec3::new(at(i), at(j), 0.0));
             }
@@ -291,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_plane_paths_are_straight() {
+    fn in_the_plane_geodesics_are_straight() {
         let mesh = plane(24, 0.3);
         let mut random = Random(1);
         for _ in 0..300 {
@@ -302,7 +222,7 @@ mod tests {
             };
             assert_eq!(path.check(&mesh), Ok(()));
             let straight = mesh.position(a).distance(mesh.position(b));
-            // Vertices exactly on the way are passed at a thousandth of an edge.
+            // Vertices on the straight line are passed at a thousandth of an edge.
             assert!(
                 (path.length(&mesh) / straight - 1.0).abs() < 1e-4,
                 "{a:?} {b:?} {}",
@@ -312,12 +232,12 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_is_walked_around() {
+    fn a_geodesic_goes_around_a_forbidden_region() {
         let mesh = plane(20, 0.0);
-        // A wall at half the width that leaves the uppermost tenth open.
-        let center = |f: FaceId| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>() / 3.0;
+        // A forbidden band at half the width that leaves the uppermost tenth open.
+        let centre = |f: FaceId| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>() / 3.0;
         let allowed = |f: FaceId| {
-            let c = center(f);
+            let c = centre(f);
             !(c.x > 0.45 && c.x < 0.55 && c.y < 0.9)
         };
         let path = geodesic_in(&mesh, VertexId(0), VertexId(20), allowed).unwrap();
@@ -325,12 +245,12 @@ mod tests {
         assert!(path.faces(&mesh).into_iter().all(allowed));
         let shortest = 2.0 * (0.45f64 * 0.45 + 0.81).sqrt() + 0.1;
         assert!((path.length(&mesh) / shortest - 1.0).abs() < 1e-3, "{} {shortest}", path.length(&mesh));
-        let closed = |f: FaceId| (center(f).x - 0.5).abs() > 0.05;
+        let closed = |f: FaceId| (centre(f).x - 0.5).abs() > 0.05;
         assert_eq!(geodesic_in(&mesh, VertexId(0), VertexId(20), closed), None);
     }
 
     #[test]
-    fn neighbours_are_joined_by_their_edge() {
+    fn adjacent_vertices_are_joined_by_their_edge() {
         let mesh = plane(4, 0.0);
         let path = geodesic_in(&mesh, VertexId(6), VertexId(7), |_| true).unwrap();
         assert!(path.crossings.is_empty() && path.check(&mesh).is_ok());
@@ -340,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn around_a_cylinder_the_way_is_that_of_the_unrolled() {
+    fn on_a_cylinder_a_geodesic_has_the_length_of_the_unrolled_line() {
         let mesh = cylinder(60, 30, 0.2);
         for (a, b) in [(0, 60 * 20 + 20), (60 * 3 + 5, 60 * 28 + 30), (60 * 30 + 59, 14)] {
             let [p, q] = [a, b].map(|i| mesh.positions()[i]);
@@ -354,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn on_real_meshes_paths_are_valid_and_no_longer_than_edge_paths() {
+    fn on_real_meshes_geodesics_are_valid_and_no_longer_than_midpoint_paths() {
         for file in ["rockerarm_5k.obj", "bunny_7k.off", "cad_upright_slivers.off"] {
             let Some(mesh) = real_mesh(file) else {
                 eprintln!("no mesh {file}: skipped");

@@ -1,41 +1,46 @@
-//! A strip of triangles laid out in the plane, and the shortest path in it.
+//! A strip of triangles unfolded to the plane, and the shortest path in it.
 //!
-//! The funnel algorithm of Lee and Preparata (1984): seen from the last corner of the path, the ends of the
-//! crossed edges narrow a funnel from both sides; where one side would cross the other, the path bends at the
-//! other's tightest end.
+//! The funnel algorithm of Lee and Preparata (1984): seen from the last bend of the path, the ends of the crossed edges
+//! narrow a funnel from both sides; where one side would cross the other, the path bends at the vertex that bounds the
+//! other side.
 
 use glam::DVec2;
 
+use super::curve::Crossing;
+use super::vertex_fan::Side;
 use crate::mesh::{HalfedgeId, TriMesh};
-use crate::surface::Crossing;
-use crate::surface::relax::Side;
 
-/// Distance in edge parameters at which a path passes the vertices that it bends around.
+/// Distance at which a path passes the vertices at which it bends, as a fraction of the crossed edge.
 const VERTEX_DISTANCE: f64 = 1e-3;
 
-/// A vertex at which the taut path bends: its side, and the crossings of its run.
+/// A vertex at which the shortest path bends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Corner {
+pub(super) struct Bend {
+    /// Side of the path on which the vertex is.
     pub side: Side,
+    /// First and last of the consecutive crossings of edges at the vertex.
     pub first: usize,
     pub last: usize,
+    /// The vertex in the plane.
     pub point: DVec2,
 }
 
-/// A strip laid out in the plane.
-pub(super) struct Unfolded {
+/// A strip unfolded to the plane.
+pub(super) struct UnfoldedStrip {
     pub start: DVec2,
     pub end: DVec2,
+    /// Right and left end of each crossed edge.
     right: Vec<DVec2>,
     left: Vec<DVec2>,
-    /// First and last crossing of the run of each right and left end.
+    /// For the right and the left end of each crossed edge the first and last of the consecutive crossings with this
+    /// end.
     runs: [Vec<(usize, usize)>; 2],
 }
 
-impl Unfolded {
-    /// Lays out the strip of these crossings, which are not none.
+impl UnfoldedStrip {
+    /// Unfolds the strip of these crossed half-edges; there is at least one.
     pub fn new(mesh: &TriMesh, strip: &[HalfedgeId]) -> Self {
-        // The third corner of the triangle of `h`, on the left of `h` laid from `a` to `b`.
+        // The third corner of the triangle of `h`, left of `h`, which goes from `a` to `b` in the plane.
         let apex = |h: HalfedgeId, a: DVec2, b: DVec2| {
             let (along, to) = (mesh.vector(h), -mesh.vector(mesh.prev(h)));
             let length = along.length().max(f64::MIN_POSITIVE);
@@ -73,37 +78,37 @@ impl Unfolded {
         Self { start, end, right, left, runs }
     }
 
-    fn corner(&self, i: usize, side: Side) -> Corner {
+    fn bend_at(&self, i: usize, side: Side) -> Bend {
         let (first, last) = self.runs[usize::from(side == Side::Left)][i];
-        Corner { side, first, last, point: if side == Side::Left { self.left[i] } else { self.right[i] } }
+        Bend { side, first, last, point: if side == Side::Left { self.left[i] } else { self.right[i] } }
     }
 
-    /// Pulls the path taut: the corners at which it bends, in order.
-    pub fn pull(&self) -> Vec<Corner> {
-        let mut corners: Vec<Corner> = Vec::new();
+    /// The bends of the shortest path, in order.
+    pub fn shortest_path(&self) -> Vec<Bend> {
+        let mut bends: Vec<Bend> = Vec::new();
         loop {
-            let from = corners.last().map_or(0, |c| c.last + 1);
-            let apex = corners.last().map_or(self.start, |c| c.point);
-            let Some(bend) = self.next_bend(apex, from) else { return corners };
-            corners.push(bend);
+            let from = bends.last().map_or(0, |c| c.last + 1);
+            let apex = bends.last().map_or(self.start, |c| c.point);
+            let Some(bend) = self.next_bend(apex, from) else { return bends };
+            bends.push(bend);
         }
     }
 
-    /// The first corner of the shortest path after `apex`, whose run ends before crossing `from`; `None` if the
-    /// end is seen from there.
-    fn next_bend(&self, apex: DVec2, from: usize) -> Option<Corner> {
+    /// The first bend of the shortest path from `apex`, where `from` is the first crossing after it; `None` if the
+    /// straight segment from `apex` to the end is inside the strip.
+    fn next_bend(&self, apex: DVec2, from: usize) -> Option<Bend> {
         let n = self.right.len();
         // The funnel: the tightest right and left ends seen from the apex.
-        let (mut right, mut left): (Option<Corner>, Option<Corner>) = (None, None);
+        let (mut right, mut left): (Option<Bend>, Option<Bend>) = (None, None);
         for i in from..=n {
             let ends = [Side::Right, Side::Left].map(|side| match i < n {
-                true => self.corner(i, side),
-                false => Corner { side, first: n, last: n, point: self.end },
+                true => self.bend_at(i, side),
+                false => Bend { side, first: n, last: n, point: self.end },
             });
             for new in ends {
                 let (own, other, sign) =
                     if new.side == Side::Right { (&mut right, left, 1.0) } else { (&mut left, right, -1.0) };
-                // Positive where `b` is seen further inside the funnel than `a`, coming from the new end's side.
+                // Positive where `b` is further inside the funnel than `a`, coming from the side of the new end.
                 let inward = |a: DVec2, b: DVec2| (a - apex).perp_dot(b - apex) * sign;
                 if own.is_some_and(|own| inward(own.point, new.point) < 0.0) {
                     continue;
@@ -117,17 +122,17 @@ impl Unfolded {
         None
     }
 
-    /// The crossings of the taut path, kept off the vertices.
-    pub fn crossings(&self, strip: &[HalfedgeId], corners: &[Corner]) -> Vec<Crossing> {
+    /// The crossings of the shortest path, at a distance of [`VERTEX_DISTANCE`] from the vertices.
+    pub fn crossings(&self, strip: &[HalfedgeId], bends: &[Bend]) -> Vec<Crossing> {
         let mut crossings = Vec::with_capacity(strip.len());
         let (mut from, mut next) = (self.start, 0);
         for (i, &halfedge) in strip.iter().enumerate() {
-            while next < corners.len() && corners[next].last < i {
-                from = corners[next].point;
+            while next < bends.len() && bends[next].last < i {
+                from = bends[next].point;
                 next += 1;
             }
             let (r, l) = (self.right[i], self.left[i]);
-            let t = match corners.get(next) {
+            let t = match bends.get(next) {
                 Some(c) if c.first <= i => f64::from(c.side == Side::Left),
                 other => {
                     let to = other.map_or(self.end, |c| c.point);
@@ -140,8 +145,8 @@ impl Unfolded {
         crossings
     }
 
-    /// The angle of the strip at a corner between the path's parts before and after it, in radians.
-    pub fn swept(&self, c: &Corner, from: DVec2, to: DVec2) -> f64 {
+    /// The angle at a bend, on the strip's side, between the parts of the path before and after it, in radians.
+    pub fn swept(&self, c: &Bend, from: DVec2, to: DVec2) -> f64 {
         let opposite = |i: usize| if c.side == Side::Left { self.right[i] } else { self.left[i] };
         let rays = std::iter::once(from).chain((c.first..=c.last).map(opposite)).chain([to]);
         let mut last: Option<DVec2> = None;

@@ -1,17 +1,20 @@
-//! The shape of the corner of a quad, as an energy.
+//! The energy of a corner of a quad, a distortion relative to an ideal corner.
 //!
-//! Both sides at a corner are measured in the lengths and the angle that they should have; `D` is the signed
-//! area they span in the quad's plane, `A` the sum of their squares: 1 and 2 for the ideal corner. The energy is
-//! `(A + λ (1 + D²)) / χ(D)` where `χ` is `D` where that is positive, but bends to stay positive below: finite
-//! for folded corners, with a way out (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free
-//! maps in 50 lines of code, 2021; Escobar et al. 2003). The first term asks for shape, the second for size.
+//! Let the map from the ideal corner to the actual one have Jacobian determinant `D` and squared Frobenius norm `A` (1
+//! and 2 for the ideal corner). The energy is `(A + λ (1 + D²)) / χ_ε(D)` with the regularisation
+//! `χ_ε(D) = (D + √(D² + ε²)) / 2`, which is positive also for `D < 0`: the energy of folded corners is finite, and its
+//! minimisation unfolds them (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of
+//! code, 2021; Escobar et al. 2003). The first term penalises the shape, the second the size.
 
 use glam::{DMat2, DVec2, DVec3};
 
-/// Weight of size beside shape.
-const SIZE: f64 = 0.25;
+/// Weight `λ` of the size relative to the shape.
+const SIZE_WEIGHT: f64 = 0.25;
 
-/// What a corner should be like.
+/// Least absolute eigenvalue of the Hessian in [`newton`], relative to the greatest one; smaller ones are raised to it.
+const LEAST_EIGENVALUE: f64 = 1e-6;
+
+/// The ideal corner.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ideal {
     /// Lengths of the sides to the next and to the previous corner.
@@ -20,10 +23,10 @@ pub(super) struct Ideal {
     pub angle: DVec2,
 }
 
-/// Which of its three points a corner is seen to depend on.
+/// Which of the three points of a corner moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Moving {
-    /// The corner itself.
+    /// The corner's own vertex.
     Own,
     /// The end of the side to the next corner.
     Next,
@@ -31,36 +34,40 @@ pub(super) enum Moving {
     Previous,
 }
 
-/// The corner at `o` with neighbours `next` and `previous`, seen along the quad's normal.
+/// A corner of a quad.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
+    /// Sides to the next and to the previous corner, over their ideal lengths.
     u: DVec3,
     w: DVec3,
+    /// Normal by which the area is signed.
     normal: DVec3,
     ideal: Ideal,
-    /// Signed area over that of the ideal corner.
+    /// `D`: signed area over that of the ideal corner.
     pub area: f64,
 }
 
 impl Corner {
+    /// The corner at `o` with neighbours `next` and `previous`.
     pub(super) fn new([o, next, previous]: [DVec3; 3], normal: DVec3, ideal: Ideal) -> Self {
         let (u, w) = ((next - o) / ideal.lengths[0], (previous - o) / ideal.lengths[1]);
         Self { u, w, normal, ideal, area: u.cross(w).dot(normal) / ideal.angle.y }
     }
 
-    fn squares(&self) -> f64 {
+    /// `A`: the squared Frobenius norm of the map from the ideal corner.
+    fn frobenius(&self) -> f64 {
         let (c, s) = (self.ideal.angle.x, self.ideal.angle.y);
         (self.u.length_squared() + self.w.length_squared() - 2.0 * c * self.u.dot(self.w)) / (s * s)
     }
 
-    /// The energy; `bend` is how far from zero the denominator begins to bend.
-    pub(super) fn energy(&self, bend: f64) -> f64 {
+    /// The energy with regularisation `epsilon`.
+    pub(super) fn energy(&self, epsilon: f64) -> f64 {
         let d = self.area;
-        (self.squares() + SIZE * (1.0 + d * d)) / bent(d, bend)
+        (self.frobenius() + SIZE_WEIGHT * (1.0 + d * d)) / chi(d, epsilon)
     }
 
-    /// Gradient and Hessian of the energy in the plane of `frame`, by the place of the point that moves.
-    pub(super) fn derivatives(&self, bend: f64, moving: Moving, frame: [DVec3; 2]) -> (DVec2, DMat2) {
+    /// Gradient and Hessian of the energy by the position of the moving point in the plane of `frame`.
+    pub(super) fn derivatives(&self, epsilon: f64, moving: Moving, frame: [DVec3; 2]) -> (DVec2, DMat2) {
         let (c, s) = (self.ideal.angle.x, self.ideal.angle.y);
         let [lu, lw] = self.ideal.lengths.map(|l| 1.0 / l);
         let (du, dw) = match moving {
@@ -70,40 +77,42 @@ impl Corner {
         };
         let flat = |x: DVec3| DVec2::new(x.dot(frame[0]), x.dot(frame[1]));
         let (u, w) = (self.u, self.w);
-        let squares_1 = flat((u - w * c) * du + (w - u * c) * dw) * (2.0 / (s * s));
-        let squares_2 = (du * du + dw * dw - 2.0 * c * du * dw) * (2.0 / (s * s));
+        let frobenius_1 = flat((u - w * c) * du + (w - u * c) * dw) * (2.0 / (s * s));
+        let frobenius_2 = (du * du + dw * dw - 2.0 * c * du * dw) * (2.0 / (s * s));
         let area_1 = flat(w.cross(self.normal) * du + self.normal.cross(u) * dw) / s;
 
         let d = self.area;
-        let r = d.hypot(bend);
-        let (x, x1, x2) = (bent(d, bend), 0.5 * (1.0 + d / r), 0.5 * bend * bend / (r * r * r));
-        let top = self.squares() + SIZE * (1.0 + d * d);
-        let top_1 = squares_1 + area_1 * (2.0 * SIZE * d);
+        let r = d.hypot(epsilon);
+        // χ and its first two derivatives.
+        let (x, x1, x2) = (chi(d, epsilon), 0.5 * (1.0 + d / r), 0.5 * epsilon * epsilon / (r * r * r));
+        let top = self.frobenius() + SIZE_WEIGHT * (1.0 + d * d);
+        let top_1 = frobenius_1 + area_1 * (2.0 * SIZE_WEIGHT * d);
         let gradient = top_1 / x - area_1 * (top * x1 / (x * x));
         let mixed = outer(top_1, area_1);
-        let hessian = DMat2::from_diagonal(DVec2::splat(squares_2 / x)) + outer(area_1, area_1) * (2.0 * SIZE / x)
+        let hessian = DMat2::from_diagonal(DVec2::splat(frobenius_2 / x))
+            + outer(area_1, area_1) * (2.0 * SIZE_WEIGHT / x)
             - (mixed + mixed.transpose()) * (x1 / (x * x))
             + outer(area_1, area_1) * (top * (2.0 * x1 * x1 / x - x2) / (x * x));
         (gradient, hessian)
     }
 }
 
-/// A positive stand-in for `d`; the second form does not cancel.
-fn bent(d: f64, bend: f64) -> f64 {
-    let r = d.hypot(bend);
-    (if d >= 0.0 { 0.5 * (d + r) } else { 0.5 * bend * bend / (r - d) }).max(f64::MIN_POSITIVE)
+/// The regularisation `χ_ε(d)`; for negative `d` in a form without cancellation.
+fn chi(d: f64, epsilon: f64) -> f64 {
+    let r = d.hypot(epsilon);
+    (if d >= 0.0 { 0.5 * (d + r) } else { 0.5 * epsilon * epsilon / (r - d) }).max(f64::MIN_POSITIVE)
 }
 
 fn outer(a: DVec2, b: DVec2) -> DMat2 {
     DMat2::from_cols(a * b.x, a * b.y)
 }
 
-/// The step of Newton's method, with the absolute values of the curvatures: always downhill.
+/// Newton's step with the absolute eigenvalues of the Hessian, always a descent direction.
 pub(super) fn newton(gradient: DVec2, hessian: DMat2) -> DVec2 {
     let (a, b, c) = (hessian.x_axis.x, 0.5 * (hessian.x_axis.y + hessian.y_axis.x), hessian.y_axis.y);
     let (mean, half) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
     let axis = DVec2::from_angle(0.5 * (2.0 * b).atan2(a - c));
-    let least = 1e-6 * (mean.abs() + half) + f64::MIN_POSITIVE;
+    let least = LEAST_EIGENVALUE * (mean.abs() + half) + f64::MIN_POSITIVE;
     let (high, low) = ((mean + half).abs().max(least), (mean - half).abs().max(least));
     let across = axis.perp();
     -(axis * (gradient.dot(axis) / high) + across * (gradient.dot(across) / low))
@@ -153,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn newton_goes_downhill_even_where_the_energy_is_concave() {
+    fn newton_is_a_descent_direction_also_where_the_energy_is_concave() {
         let (g, h) = (DVec2::new(1.0, 2.0), DMat2::from_cols(DVec2::new(-3.0, 1.0), DVec2::new(1.0, 0.5)));
         assert!(newton(g, h).dot(g) < 0.0);
         let h = DMat2::from_cols(DVec2::new(3.0, 1.0), DVec2::new(1.0, 2.0));

@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::guide::{Guide, SignedDistance};
 use super::map::Proxy;
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::{Crossing, CurveError, SurfaceCurve, SurfacePoint, nearest_in_triangle};
 
 /// Least distance of crossings from vertices, in edge parameters; the same as for geodesics.
@@ -84,11 +84,11 @@ impl CurveWalk<'_> {
     /// open guide the boundary half-edge through which it enters.
     fn start(&self, face: FaceId, at: f64) -> Option<HalfedgeId> {
         let (mesh, guide) = (self.mesh, self.guide);
-        let mut faces = vec![face];
-        let mut next = 0;
-        while next < faces.len().min(START_FACES) {
-            let sides = mesh.face_halfedges(faces[next]);
-            for h in sides {
+        let mut search: BreadthFirst<FaceId, HalfedgeId> = BreadthFirst::sparse();
+        search.start(face);
+        for _ in 0..START_FACES {
+            let f = search.visit()?;
+            for h in mesh.face_halfedges(f) {
                 let ends = [mesh.origin(h), mesh.target(h)].map(|v| self.signed_distance(v, at));
                 let crosses = if guide.closed {
                     ends[0].distance < 0.0 && ends[1].distance >= 0.0
@@ -101,12 +101,9 @@ impl CurveWalk<'_> {
                     return Some(h);
                 }
             }
-            for f in sides.into_iter().filter_map(|h| mesh.twin(h)).map(|g| mesh.face(g)) {
-                if !faces.contains(&f) {
-                    faces.push(f);
-                }
+            for (h, g) in mesh.adjacent_faces(f) {
+                search.reach(g, h);
             }
-            next += 1;
         }
         None
     }

@@ -5,12 +5,12 @@
 //! consecutive ones are joined by the shortest path in the dual graph; a path that returns at once through the same
 //! edge is shortened. All this is local, so the curve stays in its homotopy class.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
 use glam::DVec3;
 
 use super::curve_walk::VERTEX_DISTANCE;
-use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve, SurfacePoint, nearest_in_triangle};
 
 /// Triangles in which the path from one point's triangle to the next one's is searched.
@@ -61,24 +61,17 @@ pub(super) fn subdivided(mesh: &TriMesh, line: &[(DVec3, FaceId)]) -> impl Itera
 
 /// The half-edges crossed by the shortest dual path from one triangle to another near it.
 fn dual_path(mesh: &TriMesh, from: FaceId, to: FaceId) -> Option<Vec<HalfedgeId>> {
-    let mut reached_by: HashMap<FaceId, Option<HalfedgeId>> = HashMap::from([(from, None)]);
-    let mut queue = VecDeque::from([from]);
-    while let Some(f) = queue.pop_front() {
+    let mut search: BreadthFirst<FaceId, HalfedgeId> = BreadthFirst::sparse();
+    search.start(from);
+    while let Some(f) = search.visit() {
         if f == to {
-            let before = |h: &HalfedgeId| reached_by[&mesh.face(*h)];
-            let mut path: Vec<HalfedgeId> = std::iter::successors(reached_by[&to], before).collect();
-            path.reverse();
-            return Some(path);
+            return search.path_to(to, |&h| mesh.face(h));
         }
-        if reached_by.len() > SEARCH_FACES {
+        if search.reached().len() > SEARCH_FACES {
             continue;
         }
-        for h in mesh.face_halfedges(f) {
-            let Some(g) = mesh.twin(h).map(|t| mesh.face(t)) else { continue };
-            reached_by.entry(g).or_insert_with(|| {
-                queue.push_back(g);
-                Some(h)
-            });
+        for (h, g) in mesh.adjacent_faces(f) {
+            search.reach(g, h);
         }
     }
     None

@@ -7,13 +7,11 @@
 //! breadth-first traversal of patches stops there, so that one side of a crease does not blur the other; the crease
 //! itself counts for both.
 
-use std::collections::VecDeque;
-
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::tangent_tensor::{outer, plane_eigen};
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, TriMesh, VertexId};
 
 /// Radius of a patch, as a fraction of the averaging radius. A ball then holds about 60 patches, which moves the mean
 /// of a linearly varying curvature by less than a percent.
@@ -168,17 +166,16 @@ impl Patches {
 fn group(mesh: &TriMesh, radius: f64, crease: &[bool], shares: &[Piece]) -> (Vec<u32>, Vec<Piece>) {
     let mut patch_of = vec![u32::MAX; mesh.n_vertices()];
     let mut patches = Vec::new();
-    let mut queue = VecDeque::new();
+    let mut search: BreadthFirst<VertexId, ()> = BreadthFirst::new(mesh.n_vertices());
     for seed in mesh.vertices() {
-        if patch_of[seed.index()] != u32::MAX {
+        if !search.start(seed) {
             continue;
         }
         let id = patches.len() as u32;
-        patch_of[seed.index()] = id;
-        queue.push_back(seed);
         let (mut tensor, mut area, mut moment, mut centre, mut count) =
             (DMat3::ZERO, 0.0, DVec3::ZERO, DVec3::ZERO, 0.0);
-        while let Some(v) = queue.pop_front() {
+        while let Some(v) = search.visit() {
+            patch_of[v.index()] = id;
             let share = &shares[v.index()];
             tensor += share.tensor;
             area += share.area;
@@ -188,15 +185,9 @@ fn group(mesh: &TriMesh, radius: f64, crease: &[bool], shares: &[Piece]) -> (Vec
             if crease[v.index()] {
                 continue;
             }
-            for h in mesh.outgoing(v) {
-                // Both ends of the side opposite to `v`: the last neighbour in a boundary fan has no outgoing
-                // half-edge.
-                for w in [mesh.target(h), mesh.opposite(h)] {
-                    let near = mesh.position(w).distance(mesh.position(seed)) <= radius;
-                    if patch_of[w.index()] == u32::MAX && !crease[w.index()] && near {
-                        patch_of[w.index()] = id;
-                        queue.push_back(w);
-                    }
+            for (_, w) in mesh.spokes(v) {
+                if !crease[w.index()] && mesh.position(w).distance(mesh.position(seed)) <= radius {
+                    search.reach(w, ());
                 }
             }
         }

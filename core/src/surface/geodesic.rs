@@ -7,14 +7,12 @@
 //! repeated until no such vertex is left. The result is a geodesic, locally shortest; a shorter one may exist
 //! elsewhere.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
 use super::funnel::{Bend, UnfoldedStrip};
 use super::vertex_fan::{Side, spokes_across};
 use super::vertex_path::{VertexPath, joined_by_edge};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{Dijkstra, FaceId, HalfedgeId, TriMesh, VertexId};
 
 /// A fan is used only if it is narrower than π by this (radians); far above rounding, so that the loop ends.
 const MIN_BEND: f64 = 1e-7;
@@ -54,24 +52,6 @@ pub fn geodesic_in(
     }
 }
 
-/// A distance with the total order of [`f64::total_cmp`], for the queue.
-#[derive(PartialEq)]
-struct Distance(f64);
-
-impl Eq for Distance {}
-
-impl PartialOrd for Distance {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Distance {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0)
-    }
-}
-
 /// The half-edges crossed by the shortest path over midpoints of edges.
 fn midpoint_strip(
     mesh: &TriMesh,
@@ -80,22 +60,17 @@ fn midpoint_strip(
     allowed: &impl Fn(FaceId) -> bool,
 ) -> Option<Vec<HalfedgeId>> {
     let midpoint = |h| 0.5 * (mesh.position(mesh.origin(h)) + mesh.position(mesh.target(h)));
-    let mut distance = vec![f64::INFINITY; mesh.n_halfedges()];
-    let mut parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_halfedges()];
-    let mut queue = BinaryHeap::new();
+    let mut search: Dijkstra<HalfedgeId, HalfedgeId> = Dijkstra::new(mesh.n_halfedges());
     for out in mesh.outgoing(start).filter(|&h| allowed(mesh.face(h))) {
         let h = mesh.next(out);
-        distance[h.index()] = midpoint(h).distance(mesh.position(start));
-        queue.push(Reverse((Distance(distance[h.index()]), h)));
+        search.start(h, midpoint(h).distance(mesh.position(start)));
     }
     let mut best: Option<(f64, HalfedgeId)> = None;
-    while let Some(Reverse((Distance(d), h))) = queue.pop() {
+    while let Some((h, d)) = search.settle() {
         if best.is_some_and(|b| b.0 <= d) {
             break;
         }
-        let Some(entered) = mesh.twin(h).filter(|&g| d <= distance[h.index()] && allowed(mesh.face(g))) else {
-            continue;
-        };
+        let Some(entered) = mesh.twin(h).filter(|&g| allowed(mesh.face(g))) else { continue };
         if mesh.opposite(entered) == end {
             let total = d + midpoint(h).distance(mesh.position(end));
             if best.is_none_or(|b| total < b.0) {
@@ -103,16 +78,12 @@ fn midpoint_strip(
             }
         }
         for next in [mesh.next(entered), mesh.prev(entered)] {
-            let there = d + midpoint(h).distance(midpoint(next));
-            if there < distance[next.index()] {
-                distance[next.index()] = there;
-                parent[next.index()] = Some(h);
-                queue.push(Reverse((Distance(there), next)));
-            }
+            search.reach(next, d + midpoint(h).distance(midpoint(next)), h);
         }
     }
-    let mut strip: Vec<HalfedgeId> = std::iter::successors(Some(best?.1), |h| parent[h.index()]).collect();
-    strip.reverse();
+    let last = best?.1;
+    let mut strip = search.path_to(last, |&h| h)?;
+    strip.push(last);
     Some(strip)
 }
 

@@ -1,12 +1,11 @@
 //! Meshes and curves for tests of curves on surfaces.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::curve::{Crossing, SurfaceCurve};
 use crate::surface::geodesic::geodesic_in;
 use crate::surface::vertex_path::VertexPath;
@@ -100,23 +99,19 @@ pub fn upright(mesh: &TriMesh, nu: usize, nv: usize, i: usize) -> SurfaceCurve {
 /// random triangle. `None` where the cycle is too short.
 pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
     let root = FaceId::new(random.below(mesh.n_faces()));
-    // The half-edge of a triangle's side towards its parent in the tree.
-    let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_faces()];
-    let mut queue = VecDeque::from([root]);
-    while let Some(f) = queue.pop_front() {
-        for h in mesh.face_halfedges(f) {
-            let Some(g) = mesh.twin(h) else { continue };
-            if mesh.face(g) != root && to_parent[mesh.face(g).index()].is_none() {
-                to_parent[mesh.face(g).index()] = Some(g);
-                queue.push_back(mesh.face(g));
-            }
+    let mut tree: BreadthFirst<FaceId, HalfedgeId> = BreadthFirst::new(mesh.n_faces());
+    tree.start(root);
+    while let Some(f) = tree.visit() {
+        for (h, g) in mesh.adjacent_faces(f) {
+            tree.reach(g, h);
         }
     }
+    // The half-edges crossed from a triangle up to the root.
     let path = |mut f: FaceId| {
         let mut up = Vec::new();
-        while let Some(h) = to_parent[f.index()] {
-            up.push(h);
-            f = mesh.face(mesh.twin(h).unwrap());
+        while let Some(h) = tree.via(f) {
+            up.push(mesh.twin(h).unwrap());
+            f = mesh.face(h);
         }
         up
     };
@@ -139,15 +134,11 @@ pub fn dual_cycle(mesh: &TriMesh, random: &mut Random) -> Option<SurfaceCurve> {
 /// Algebraic intersection numbers of a closed curve with `count` closed edge paths, each a random edge and its path in
 /// a breadth-first tree of the vertices. They depend on the homology class of the curve alone.
 pub fn homology_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> Vec<i64> {
-    let mut to_parent: Vec<Option<HalfedgeId>> = vec![None; mesh.n_vertices()];
-    let mut queue = VecDeque::from([VertexId(0)]);
-    while let Some(v) = queue.pop_front() {
-        for h in mesh.outgoing(v).chain(mesh.outgoing(v).map(|h| mesh.prev(h))) {
-            let w = if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) };
-            if w != VertexId(0) && to_parent[w.index()].is_none() {
-                to_parent[w.index()] = Some(h);
-                queue.push_back(w);
-            }
+    let mut tree: BreadthFirst<VertexId, HalfedgeId> = BreadthFirst::new(mesh.n_vertices());
+    tree.start(VertexId(0));
+    while let Some(v) = tree.visit() {
+        for (h, w) in mesh.spokes(v) {
+            tree.reach(w, h);
         }
     }
     let mut signed = vec![0i64; mesh.n_edges()];
@@ -158,7 +149,7 @@ pub fn homology_numbers(mesh: &TriMesh, curve: &SurfaceCurve, count: usize) -> V
     // The signed crossings on the path from `v` to the root of its tree, and that root.
     let up = |mut v: VertexId| {
         let mut sum = 0;
-        while let Some(h) = to_parent[v.index()] {
+        while let Some(h) = tree.via(v) {
             let w = if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) };
             let e = mesh.edge(h);
             sum += signed[e.index()] * if mesh.edge_vertices(e)[0] == v { 1 } else { -1 };

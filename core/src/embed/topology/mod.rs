@@ -13,4 +13,6 @@ pub(in crate::embed) mod refinement;
 pub(in crate::embed) mod through_arcs;
 
 #[cfg(test)]
+mod partial_layout_tests;
+#[cfg(test)]
 pub(in crate::embed) mod testing;

@@ -1,29 +1,30 @@
 //! From edge paths in a refined mesh to a layout file.
 //!
-//! A refinement consists of chains of vertices along each edge of the mesh and of vertices inside its triangles.
-//! An arc crosses an edge where it comes out of one triangle and goes on in another; all else of its path may be
-//! forgotten, since the order of the crossings along each edge says how arcs lie to each other.
+//! A refinement has a chain of vertices along each edge of the mesh, and vertices inside its triangles. Only the
+//! crossings of an arc with mesh edges are written: their order along each edge determines the embedding up to
+//! homotopy.
 
 use std::collections::{HashMap, HashSet};
 
-use super::{ArcEnd, FileArc, FileNode, LayoutFile, LayoutFileError, PartialEmbedding, PathPoint};
+use super::format::{ArcEnd, FileArc, FileNode, LayoutFile, LayoutFileError, PathPoint};
+use super::partial_embedding::PartialEmbedding;
 use crate::dual::RefinedMesh;
-use crate::layout::initial_embedding::Embedding;
+use crate::layout::embedding::Embedding;
 use crate::layout::structure::{Node, QuadLayout};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, MeshSource, TriMesh, VertexId};
 use crate::surface::{Crossing, SurfacePoint};
 
-/// Least distance of two places on an edge from each other and from its ends, as a fraction of the edge: far above
-/// rounding, so that the order survives, and far below what can be seen.
-const GAP: f64 = 1e-9;
+/// Least distance of two points on an edge from each other and from its ends, as a fraction of the edge. Far above
+/// rounding errors, so that their order is kept, and far below what is visible.
+const MIN_SEPARATION: f64 = 1e-9;
 
 impl LayoutFile {
-    /// A layout embedded on `base`, such as a woven one. Nothing is fixed.
+    /// A complete layout embedded on a refinement of `base`. Nothing is fixed.
     ///
     /// # Errors
     ///
-    /// [`LayoutFileError::NotOnMesh`] or [`LayoutFileError::Ends`] if layout, embedding and mesh do not belong
-    /// together.
+    /// [`LayoutFileError::NotOnMesh`], [`LayoutFileError::OtherRefinement`] or [`LayoutFileError::Ends`] if layout,
+    /// embedding and mesh do not match.
     pub fn from_embedding(
         source: MeshSource,
         base: &TriMesh,
@@ -42,25 +43,25 @@ impl LayoutFile {
         Paths { base, mesh, base_face }.write(source, &layout.nodes, nodes, arcs, &ends)
     }
 
-    /// A drawn layout, complete or not. Nothing is fixed.
+    /// A layout, complete or partial, embedded on a refinement of `base`. Nothing is fixed.
     ///
     /// # Errors
     ///
-    /// [`LayoutFileError::NotOnMesh`] if the drawing is not one on `base`.
-    pub fn from_drawing(
+    /// [`LayoutFileError::NotOnMesh`] if the embedding is not on a refinement of `base`.
+    pub fn from_partial_embedding(
         source: MeshSource,
         base: &TriMesh,
-        drawing: &PartialEmbedding,
+        embedding: &PartialEmbedding,
     ) -> Result<Self, LayoutFileError> {
-        let PartialEmbedding { mesh, base_face, nodes, kinds, arcs, ends, .. } = drawing;
-        Paths { base, mesh, base_face }.write(source, kinds, nodes, arcs, ends)
+        let PartialEmbedding { mesh, base_face, nodes, layout_nodes, arcs, ends, .. } = embedding;
+        Paths { base, mesh, base_face }.write(source, layout_nodes, nodes, arcs, ends)
     }
 }
 
-/// The slot of every edge that leaves a node along an arc of a complete layout, by its two vertices.
+/// The slot of every edge that leaves a node along an arc of a complete layout, by the edge's two vertices.
 fn slots(
     mesh: &RefinedMesh,
-    kinds: &[Node],
+    layout_nodes: &[Node],
     nodes: &[u32],
     arcs: &[Vec<u32>],
 ) -> Result<HashMap<(u32, u32), u32>, LayoutFileError> {
@@ -70,7 +71,7 @@ fn slots(
         .flat_map(|path| [(path[0], path[1]), (path[path.len() - 1], path[path.len() - 2])])
         .collect();
     let mut slots = HashMap::new();
-    for (node, (&v, kind)) in nodes.iter().zip(kinds).enumerate() {
+    for (node, (&v, layout_node)) in nodes.iter().zip(layout_nodes).enumerate() {
         let mut ends = 0;
         for w in mesh.neighbours(v) {
             if leaving.contains(&(v, w)) {
@@ -79,18 +80,18 @@ fn slots(
             }
         }
         let ends = ends as usize;
-        if ends != kind.valence + usize::from(kind.boundary) {
-            return Err(LayoutFileError::Ends { node, valence: kind.valence, ends });
+        if ends != layout_node.valence + usize::from(layout_node.boundary) {
+            return Err(LayoutFileError::Ends { node, valence: layout_node.valence, ends });
         }
     }
     Ok(slots)
 }
 
-/// Where a vertex of a refinement lies on the mesh.
+/// Position on the mesh of a vertex of a refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Spot {
     Vertex(VertexId),
-    /// On an edge, at this fraction along the edge's own half-edge.
+    /// With the fraction along the half-edge [`TriMesh::halfedge`].
     Edge(EdgeId, f64),
     Inside(FaceId),
 }
@@ -103,10 +104,11 @@ struct Paths<'a> {
 }
 
 impl Paths<'_> {
+    /// The file for nodes and arcs given by vertices of the refinement.
     fn write(
         &self,
         source: MeshSource,
-        kinds: &[Node],
+        layout_nodes: &[Node],
         nodes: &[u32],
         arcs: &[Vec<u32>],
         ends: &[[ArcEnd; 2]],
@@ -116,8 +118,12 @@ impl Paths<'_> {
         let used = nodes.iter().copied().chain(crossings.iter().flatten().map(|c| c.0));
         let spots = self.spots(used.collect())?;
         let mut file = LayoutFile::new(source, self.base);
-        for (&v, kind) in nodes.iter().zip(kinds) {
-            file.nodes.push(FileNode { at: self.point(v, spots[&v]), valence: kind.valence as u32, fixed: false });
+        for (&v, layout_node) in nodes.iter().zip(layout_nodes) {
+            file.nodes.push(FileNode {
+                at: self.point(v, spots[&v]),
+                valence: layout_node.valence as u32,
+                fixed: false,
+            });
         }
         for (places, &ends) in crossings.into_iter().zip(ends) {
             let point = |(v, crossed): (u32, Option<HalfedgeId>)| match (spots[&v], crossed) {
@@ -132,8 +138,8 @@ impl Paths<'_> {
         Ok(file)
     }
 
-    /// The vertices at which an arc crosses an edge, each with the half-edge in the triangle that it leaves, and
-    /// those that are vertices of the mesh. None for an arc along the boundary.
+    /// The vertices at which an arc crosses an edge, each with the half-edge in the triangle that the arc leaves, and
+    /// the vertices of the mesh on its path. Empty for a boundary arc.
     fn places(&self, arc: usize, path: &[u32]) -> Result<Vec<(u32, Option<HalfedgeId>)>, LayoutFileError> {
         let mut places = Vec::new();
         let mut current = None;
@@ -177,7 +183,7 @@ impl Paths<'_> {
         self.mesh.twin(h).is_none_or(|t| self.base_face[t as usize / 3] != self.base_face[h as usize / 3])
     }
 
-    /// Where the vertices `used` lie. On each edge those used are kept apart.
+    /// The positions of the vertices `used`. Those on an edge are separated by at least [`MIN_SEPARATION`].
     fn spots(&self, used: Vec<u32>) -> Result<HashMap<u32, Spot>, LayoutFileError> {
         let n_base = self.base.n_vertices() as u32;
         let mut spots: HashMap<u32, Spot> = HashMap::new();
@@ -189,7 +195,7 @@ impl Paths<'_> {
             let chain = self.chain(self.base.halfedge(e)).ok_or(LayoutFileError::OtherRefinement)?;
             let along = self.along(&chain);
             let on_edge: Vec<usize> = (1..chain.len() - 1).filter(|&i| spots.contains_key(&chain[i])).collect();
-            let fractions = apart(on_edge.iter().map(|&i| along[i]).collect());
+            let fractions = separated(on_edge.iter().map(|&i| along[i]).collect());
             for (i, t) in on_edge.into_iter().zip(fractions) {
                 spots.insert(chain[i], Spot::Edge(e, t));
             }
@@ -200,7 +206,7 @@ impl Paths<'_> {
     /// The vertices of the refinement along a half-edge of the mesh, its ends included.
     fn chain(&self, h: HalfedgeId) -> Option<Vec<u32>> {
         let (start, end, face) = (self.base.origin(h).0, self.base.target(h).0, self.base.face(h).0);
-        // The only edge that leaves a vertex on `h` with the triangle to its left is the next one along `h`.
+        // Only the next edge along `h` leaves a vertex on `h` with the triangle of `h` to its left.
         let next = |v: u32| {
             let along = |&g: &u32| self.base_face[g as usize / 3] == face && self.on_edge(g);
             self.mesh.outgoing(v).into_iter().find(along).map(|g| self.mesh.target(g))
@@ -235,10 +241,10 @@ impl Paths<'_> {
                 let [a, b, c] = self.base.face_vertices(face).map(|v| self.base.position(v));
                 let p = self.mesh.positions[v as usize];
                 let normal = self.base.face_normal(face);
-                // Never on the border of the triangle, where a vertex inside it would change its meaning.
+                // Weights are kept positive: on the border of the triangle the file would mean another position.
                 let parts = [(b, c), (c, a), (a, b)].map(|(x, y)| (x - p).cross(y - p).dot(normal));
                 let total = parts.iter().map(|w| w.max(0.0)).sum::<f64>().max(f64::MIN_POSITIVE);
-                let inner = parts.map(|w| (w / total).max(GAP));
+                let inner = parts.map(|w| (w / total).max(MIN_SEPARATION));
                 let sum: f64 = inner.iter().sum();
                 SurfacePoint { face, weights: inner.map(|w| w / sum) }
             }
@@ -255,9 +261,9 @@ fn corner_weights(h: HalfedgeId, weights: [f64; 3]) -> SurfacePoint {
     point
 }
 
-/// Increasing fractions, moved by as little as keeps them apart from each other and from 0 and 1.
-fn apart(mut fractions: Vec<f64>) -> Vec<f64> {
-    let gap = GAP.min(0.5 / (fractions.len() + 1) as f64);
+/// Moves ascending fractions minimally such that they have the least distance from each other and from 0 and 1.
+fn separated(mut fractions: Vec<f64>) -> Vec<f64> {
+    let gap = MIN_SEPARATION.min(0.5 / (fractions.len() + 1) as f64);
     let mut least = gap;
     for t in &mut fractions {
         *t = t.max(least);

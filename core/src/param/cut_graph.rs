@@ -1,51 +1,51 @@
-//! Cutting a surface so that a cross field becomes a pair of vector fields.
+//! The cut graph: cuts along which a cross field becomes a pair of vector fields.
 //!
-//! A spanning tree of the triangles says where not to cut; of the other edges those are closed again that lead to
-//! nothing, so that the rest runs between nodes, boundaries and around handles. The tree is chosen such that these
-//! cuts are short (Erickson and Whittlesey's greedy system of loops, with all nodes and boundaries as its base):
-//! crossed first are the edges far from a shortest path forest. All singularities being nodes, on what remains none
-//! can be circled, hence the crosses of all triangles can be turned so that all period jumps vanish
-//! but those on the cuts. The result of a map does not depend on where the cuts run, only its cost does.
+//! A spanning tree of the dual graph joins all triangles; the edges that the tree does not cross are cut. Cuts with a
+//! free end that is neither a node nor on the boundary are removed. The remaining cuts run between nodes and boundaries
+//! and around handles. The tree is chosen to keep the cuts short: edges far from a shortest-path forest, rooted at
+//! nodes and boundaries, are crossed first (Erickson and Whittlesey, greedy system of loops). If all singularities are
+//! nodes, no loop in the cut surface encloses one. Then the crosses can be combed: turned so that all period jumps off
+//! the cuts vanish. Where the cuts run affects the cost of solving but not the map.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::ParamError;
 use crate::field::{CrossField, Step};
-use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{Dijkstra, EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 
-/// For an edge that is not cut.
+/// Entry of [`CutGraph::path`] for an edge that is not cut.
 const NO_PATH: (u32, bool) = (u32::MAX, false);
 
-/// A cut surface with combed crosses.
+/// The cut graph of a surface, with combed crosses.
 #[derive(Debug, Clone)]
-pub struct Cut {
+pub struct CutGraph {
     /// Quarter turns from each triangle's cross angle to its first chart axis.
     pub turn: Vec<i32>,
-    /// The chart vertex of each corner (of each half-edge's origin): corners of one vertex that no cut separates.
+    /// The wedge of each corner (of each half-edge's origin): the corners of a vertex that no cut separates.
     pub wedge: Vec<u32>,
-    /// Number of chart vertices.
+    /// Number of wedges.
     pub n_wedges: usize,
-    /// A triangle of each component.
+    /// One triangle of each component of the surface.
     pub roots: Vec<FaceId>,
-    /// The cuts between nodes, boundaries and forks.
+    /// The cuts, divided at nodes, boundary vertices and branch points.
     pub paths: Vec<CutPath>,
-    /// For each edge the path it is on and whether in the direction of [`TriMesh::halfedge`].
+    /// For each edge its path and whether the path runs in the direction of [`TriMesh::halfedge`].
     path: Vec<(u32, bool)>,
 }
 
-/// A cut without forks.
+/// A cut without branch points.
 #[derive(Debug, Clone)]
 pub struct CutPath {
     /// Consecutive edges.
     pub steps: Vec<Step>,
-    /// Period jump from its left to its right side, between combed crosses, 0 to 3.
+    /// Period jump of the combed crosses from the left to the right side, 0 to 3.
     pub jump: i32,
 }
 
-impl Cut {
-    /// Cuts `mesh` for the period jumps of `field`, such that the cuts reach all of `nodes`, among which all
-    /// singularities must be.
+impl CutGraph {
+    /// Cuts `mesh` for the period jumps of `field`. The cuts reach all of `nodes`, which must include all
+    /// singularities.
     ///
     /// # Errors
     ///
@@ -82,7 +82,7 @@ impl Cut {
         Ok(Self { turn, wedge, n_wedges, roots, paths, path })
     }
 
-    /// The cut that crossing `h` leads across, as a position in [`Self::paths`], and whether from its left.
+    /// The cut on the edge of `h`, as a position in [`Self::paths`], and whether `h` lies to its left.
     pub fn crossing(&self, mesh: &TriMesh, h: HalfedgeId) -> Option<(usize, bool)> {
         let e = mesh.edge(h);
         let (path, forward) = self.path[e.index()];
@@ -90,7 +90,8 @@ impl Cut {
     }
 }
 
-/// Spans the triangles and combs the crosses along the tree: the edges not crossed, the turns and the roots.
+/// Builds the dual spanning forest and combs the crosses along it. Returns the edges not crossed, the turns and the
+/// roots.
 fn comb(mesh: &TriMesh, field: &CrossField, is_node: &[bool]) -> (Vec<bool>, Vec<i32>, Vec<FaceId>) {
     let priority = crossing_priority(mesh, is_node);
     let mut uncrossed: Vec<bool> = mesh.edges().map(|e| !mesh.is_boundary_edge(e)).collect();
@@ -122,52 +123,39 @@ fn comb(mesh: &TriMesh, field: &CrossField, is_node: &[bool]) -> (Vec<bool>, Vec
     (uncrossed, turn, roots)
 }
 
-/// How early each edge is to be crossed: by the length of the loop it closes in a forest of shortest paths from
-/// nodes and boundaries; edges of the forest last.
+/// Priority of crossing each edge, high first: the length of the loop that the edge closes in the forest of shortest
+/// paths from nodes and boundaries; 0 for edges of the forest.
 fn crossing_priority(mesh: &TriMesh, is_node: &[bool]) -> Vec<f64> {
-    let mut distance = vec![f64::INFINITY; mesh.n_vertices()];
-    let mut parent: Vec<Option<EdgeId>> = vec![None; mesh.n_vertices()];
-    let mut queue = BinaryHeap::new();
+    let mut search = Dijkstra::new(mesh.n_vertices());
     for v in mesh.vertices().filter(|&v| is_node[v.index()] || mesh.is_boundary_vertex(v)) {
-        distance[v.index()] = 0.0;
-        queue.push(Reverse((0u64, v)));
+        search.start(v, 0.0);
     }
     for start in mesh.vertices() {
-        // The first round spends the queue; later ones only meet components without a base.
-        while let Some(Reverse((bits, v))) = queue.pop() {
-            if f64::from_bits(bits) > distance[v.index()] {
-                continue;
-            }
-            for h in mesh.outgoing(v).flat_map(|h| [h, mesh.prev(h)]) {
-                let w = if mesh.origin(h) == v { mesh.target(h) } else { mesh.origin(h) };
-                let far = f64::from_bits(bits) + mesh.vector(h).length();
-                if far < distance[w.index()] {
-                    distance[w.index()] = far;
-                    parent[w.index()] = Some(mesh.edge(h));
-                    queue.push(Reverse((far.to_bits(), w)));
-                }
+        // The first pass searches from all nodes and boundaries. Later passes only reach components without them.
+        while let Some((v, distance)) = search.settle() {
+            for (h, w) in mesh.spokes(v) {
+                search.reach(w, distance + mesh.vector(h).length(), h);
             }
         }
-        if distance[start.index()].is_infinite() {
-            distance[start.index()] = 0.0;
-            queue.push(Reverse((0, start)));
+        if search.distance(start).is_infinite() {
+            search.start(start, 0.0);
         }
     }
     let mut priority: Vec<f64> = mesh
         .edges()
         .map(|e| {
             let [a, b] = mesh.edge_vertices(e);
-            let ends = distance[a.index()] + distance[b.index()];
+            let ends = search.distance(a) + search.distance(b);
             if ends.is_finite() { ends + mesh.edge_length(e) } else { 0.0 }
         })
         .collect();
-    for e in parent.into_iter().flatten() {
-        priority[e.index()] = 0.0;
+    for h in mesh.vertices().filter_map(|v| search.via(v)) {
+        priority[mesh.edge(h).index()] = 0.0;
     }
     priority
 }
 
-/// Closes the cuts that end at a vertex which is neither a node nor on the boundary.
+/// Removes cuts that end at a vertex which is neither a node nor on the boundary.
 fn prune(mesh: &TriMesh, mut is_cut: Vec<bool>, is_node: &[bool]) -> Vec<bool> {
     let mut degree = vec![0u32; mesh.n_vertices()];
     for e in mesh.edges().filter(|e| is_cut[e.index()]) {
@@ -175,16 +163,16 @@ fn prune(mesh: &TriMesh, mut is_cut: Vec<bool>, is_node: &[bool]) -> Vec<bool> {
             degree[v.index()] += 1;
         }
     }
-    let leads_nowhere =
+    let is_loose_end =
         |v: VertexId, degree: &[u32]| degree[v.index()] == 1 && !is_node[v.index()] && !mesh.is_boundary_vertex(v);
-    let mut stack: Vec<VertexId> = mesh.vertices().filter(|&v| leads_nowhere(v, &degree)).collect();
+    let mut stack: Vec<VertexId> = mesh.vertices().filter(|&v| is_loose_end(v, &degree)).collect();
     while let Some(v) = stack.pop() {
         let spokes = mesh.outgoing(v).map(|h| mesh.edge(h));
         let Some(e) = spokes.into_iter().find(|e| is_cut[e.index()]) else { continue };
         is_cut[e.index()] = false;
         for w in mesh.edge_vertices(e) {
             degree[w.index()] -= 1;
-            if leads_nowhere(w, &degree) {
+            if is_loose_end(w, &degree) {
                 stack.push(w);
             }
         }
@@ -192,14 +180,14 @@ fn prune(mesh: &TriMesh, mut is_cut: Vec<bool>, is_node: &[bool]) -> Vec<bool> {
     is_cut
 }
 
-/// Numbers the groups of corners at each vertex that the cuts leave together.
+/// Numbers the wedges: the groups of corners of each vertex between cuts.
 fn wedges(mesh: &TriMesh, is_cut: &[bool]) -> (Vec<u32>, usize) {
     let mut wedge = vec![0; mesh.n_halfedges()];
     let mut count = 0u32;
     for v in mesh.vertices() {
         let fan: Vec<_> = mesh.outgoing(v).collect();
         let first = fan.iter().position(|&h| is_cut[mesh.edge(h).index()]).unwrap_or(0);
-        // At the boundary the fan is a chain from its first half-edge, else a cycle that starts behind a cut.
+        // At the boundary the fan is a chain from its first half-edge; inside it is a cycle that starts behind a cut.
         let first = if mesh.is_boundary_vertex(v) { 0 } else { first };
         for i in 0..fan.len() {
             let h = fan[(first + i) % fan.len()];
@@ -213,7 +201,7 @@ fn wedges(mesh: &TriMesh, is_cut: &[bool]) -> (Vec<u32>, usize) {
     (wedge, count as usize)
 }
 
-/// The cut edges as paths between vertices where not exactly two of them meet, or which are nodes.
+/// The cut edges as paths, divided at nodes, boundary vertices and vertices where not exactly two cut edges meet.
 fn cut_paths(mesh: &TriMesh, is_cut: &[bool], is_node: &[bool]) -> Vec<Vec<Step>> {
     let mut at: Vec<Vec<Step>> = vec![Vec::new(); mesh.n_vertices()];
     for edge in mesh.edges().filter(|e| is_cut[e.index()]) {
@@ -224,7 +212,7 @@ fn cut_paths(mesh: &TriMesh, is_cut: &[bool], is_node: &[bool]) -> Vec<Vec<Step>
     let ends = |v: VertexId| at[v.index()].len() != 2 || is_node[v.index()] || mesh.is_boundary_vertex(v);
     let mut used = vec![false; mesh.n_edges()];
     let mut paths = Vec::new();
-    // From all nodes first; what is then left are cycles without nodes.
+    // Start from division points first; the cut edges then left are cycles.
     let starts = mesh.vertices().filter(|&v| ends(v)).chain(mesh.vertices());
     for &first in starts.flat_map(|v| at[v.index()].iter()) {
         if used[first.edge.index()] {

@@ -1,34 +1,35 @@
-//! Nodes and arcs of a layout file as places on the mesh, and what is wrong with them.
+//! Positions of the nodes and arcs of a layout file on the mesh, and their checks.
 
 use std::collections::HashMap;
 
-use super::{FileNode, LayoutFile, MAX_VALENCE, PartialEmbeddingError, PathPoint};
+use super::error::{MAX_VALENCE, PartialEmbeddingError};
+use super::format::{FileNode, LayoutFile, PathPoint};
 use crate::mesh::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Crossing;
 
-/// How far the weights of a node may be from the sum 1: written with ten digits, they still are.
+/// Largest difference of the sum of a node's weights from 1; weights written with ten digits satisfy it.
 const WEIGHT_SUM: f64 = 1e-9;
 
-/// Where on the mesh a point lies.
+/// Position of a point on the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Place {
     Vertex(VertexId),
-    /// The fraction is that along the edge's own half-edge, [`TriMesh::halfedge`].
+    /// With the fraction along the half-edge [`TriMesh::halfedge`].
     Edge(EdgeId, f64),
     Inside(FaceId),
 }
 
-/// A point of an arc.
+/// A point of an arc: a node or a point of its path.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stop {
+pub(super) struct ArcPoint {
     pub place: Place,
-    /// For a crossing: the triangle left and the one entered.
+    /// For a crossing: the triangle that the arc leaves and the one it enters.
     pub faces: Option<[FaceId; 2]>,
-    /// Its vertex, once there is one.
+    /// Its vertex in the refined mesh, once inserted.
     pub vertex: u32,
 }
 
-/// Where a node lies.
+/// The position of a node.
 pub(super) fn node_place(
     base: &TriMesh,
     node: u32,
@@ -75,7 +76,7 @@ impl Place {
         }
     }
 
-    /// The triangles that contain it.
+    /// The triangles that contain the point.
     pub(super) fn faces(self, base: &TriMesh) -> Vec<FaceId> {
         match self {
             Self::Vertex(v) => base.outgoing(v).map(|h| base.face(h)).collect(),
@@ -87,7 +88,7 @@ impl Place {
         }
     }
 
-    /// Whether it lies on an edge, its ends included.
+    /// Whether the point lies on an edge, ends included.
     pub(super) fn is_on(self, base: &TriMesh, e: EdgeId) -> bool {
         match self {
             Self::Vertex(v) => base.edge_vertices(e).contains(&v),
@@ -96,7 +97,7 @@ impl Place {
         }
     }
 
-    /// An edge that it shares with another place.
+    /// An edge that contains this and another point.
     pub(super) fn common_edge(self, base: &TriMesh, other: Self) -> Option<EdgeId> {
         let edges = match self {
             Self::Vertex(v) => base.outgoing(v).flat_map(|h| [base.edge(h), base.edge(base.prev(h))]).collect(),
@@ -107,7 +108,7 @@ impl Place {
     }
 }
 
-/// Checks that nodes and slots exist and that no slot is taken twice.
+/// Checks that nodes and slots of all arc ends exist and that no slot is taken twice.
 pub(super) fn check_slots(file: &LayoutFile, base: &TriMesh, places: &[Place]) -> Result<(), PartialEmbeddingError> {
     let mut taken = HashMap::new();
     for (arc, a) in file.arcs.iter().enumerate() {
@@ -129,7 +130,8 @@ pub(super) fn check_slots(file: &LayoutFile, base: &TriMesh, places: &[Place]) -
     Ok(())
 }
 
-/// The nodes between which arc `a` runs along the boundary with the surface to its left, if its slots say so.
+/// The nodes of arc `a` in the order in which it runs along the boundary with the surface to the left; `None` unless
+/// its slots are those of a boundary arc.
 pub(super) fn along_boundary(file: &LayoutFile, base: &TriMesh, places: &[Place], a: usize) -> Option<[u32; 2]> {
     let [p, q] = file.arcs[a].ends;
     let outer = |node: u32| places[node as usize].is_boundary(base).then(|| file.nodes[node as usize].valence);
@@ -141,31 +143,31 @@ pub(super) fn along_boundary(file: &LayoutFile, base: &TriMesh, places: &[Place]
     }
 }
 
-/// The stops of an arc, both nodes included.
-pub(super) fn stops(
+/// The points of an arc, both nodes included.
+pub(super) fn arc_points(
     file: &LayoutFile,
     base: &TriMesh,
     places: &[Place],
     a: usize,
-) -> Result<Vec<Stop>, PartialEmbeddingError> {
+) -> Result<Vec<ArcPoint>, PartialEmbeddingError> {
     let arc = &file.arcs[a];
-    let at_node = |i: usize| Stop { place: places[arc.ends[i].node as usize], faces: None, vertex: u32::MAX };
+    let at_node = |i: usize| ArcPoint { place: places[arc.ends[i].node as usize], faces: None, vertex: u32::MAX };
     let mut list = vec![at_node(0)];
-    for (place, point) in arc.path.iter().enumerate() {
-        let wrong = |reason| PartialEmbeddingError::Place { arc: a as u32, place, reason };
-        list.push(match *point {
+    for (point, path_point) in arc.path.iter().enumerate() {
+        let wrong = |reason| PartialEmbeddingError::PathPoint { arc: a as u32, point, reason };
+        list.push(match *path_point {
             PathPoint::Vertex { vertex } if vertex.index() >= base.n_vertices() => {
                 return Err(wrong("the mesh has no such vertex"));
             }
-            PathPoint::Vertex { vertex } => Stop { place: Place::Vertex(vertex), faces: None, vertex: u32::MAX },
-            PathPoint::Crossing(c) => crossing_stop(base, c).map_err(wrong)?,
+            PathPoint::Vertex { vertex } => ArcPoint { place: Place::Vertex(vertex), faces: None, vertex: u32::MAX },
+            PathPoint::Crossing(c) => crossing_point(base, c).map_err(wrong)?,
         });
     }
     list.push(at_node(1));
     Ok(list)
 }
 
-fn crossing_stop(base: &TriMesh, Crossing { halfedge: h, t }: Crossing) -> Result<Stop, &'static str> {
+fn crossing_point(base: &TriMesh, Crossing { halfedge: h, t }: Crossing) -> Result<ArcPoint, &'static str> {
     if h.index() >= base.n_halfedges() {
         return Err("the mesh has no such half-edge");
     }
@@ -175,5 +177,5 @@ fn crossing_stop(base: &TriMesh, Crossing { halfedge: h, t }: Crossing) -> Resul
     if !(inner(t) && matches!(place, Place::Edge(_, s) if inner(s))) {
         return Err("t is not strictly between 0 and 1");
     }
-    Ok(Stop { place, faces: Some([base.face(h), base.face(twin)]), vertex: u32::MAX })
+    Ok(ArcPoint { place, faces: Some([base.face(h), base.face(twin)]), vertex: u32::MAX })
 }

@@ -1,24 +1,22 @@
-//! Stiffening: the weights of folded triangles and of those around them grow until the least-squares solution folds
-//! no more, at the price of a larger residual (Bommes, Zimmer and Kobbelt, Mixed-Integer Quadrangulation, section
-//! 5.3; Campen, section 6.5). It finds no map where there is none, but it lessens folds where constraints cannot.
+//! The least-squares solution with stiffened flipped triangles; see [`Stiffening`].
 
 use glam::DVec2;
 
-use super::OrientationProblem;
 use super::domain::Neighbours;
+use super::problem::OrientationProblem;
+use crate::param::stiffening::Stiffening;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::{SparseHermitian, SpdSymbolic};
 
-/// Rounds of solving; what has not unfolded by then is held by constraints.
-const ROUNDS: usize = 12;
-/// Rounds without fewer folds after which there is little hope for more.
+/// Most solves. Triangles that are still flipped then are forced so by constraints.
+const MAX_ROUNDS: usize = 12;
+/// Rounds without fewer flipped triangles after which stiffening stops.
 const PATIENCE: usize = 4;
-/// By how much the weight of a folded triangle grows in a round.
-const GROWTH: f64 = 3.0;
-/// Rings around folds in which the growth fades out, halved from one to the next, so that no fold moves next door.
-const RINGS: u32 = 4;
+/// The weight of a flipped triangle triples in a round; the growth halves from ring to ring.
+const STIFFENING: Stiffening = Stiffening { growth: 2.0, fading: 0.5, rings: 4, limit: f64::INFINITY };
 
-/// The free variables of the stiffened solution of fewest folds; `None` if the system cannot be solved.
+/// The free variables of the stiffened solution with the fewest flipped triangles, those in `spared` not counted.
+/// `None` if the system cannot be solved.
 pub(super) fn stiffen(
     problem: &OrientationProblem,
     neighbours: &Neighbours,
@@ -29,7 +27,7 @@ pub(super) fn stiffen(
     let mut best: Option<(usize, Vec<f64>)> = None;
     let mut symbolic: Option<SpdSymbolic> = None;
     let mut since = 0;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         progress.check()?;
         let (matrix, rhs) = assemble(problem, &factor);
         if symbolic.is_none() {
@@ -41,9 +39,9 @@ pub(super) fn stiffen(
             break;
         };
         let x = problem.reduction.expand(&solution);
-        let folded: Vec<u32> = problem.folded(&x).into_iter().filter(|&t| !spared[t as usize]).collect();
-        let count = folded.len();
-        let distance = neighbours.distance(problem, &folded, RINGS);
+        let flipped: Vec<u32> = problem.flipped(&x).into_iter().filter(|&t| !spared[t as usize]).collect();
+        let count = flipped.len();
+        let distance = neighbours.distance(problem, &flipped, STIFFENING.rings);
         if best.as_ref().is_none_or(|b| count < b.0) {
             best = Some((count, solution));
             since = 0;
@@ -52,9 +50,7 @@ pub(super) fn stiffen(
         if count == 0 || since > PATIENCE {
             break;
         }
-        for (factor, d) in factor.iter_mut().zip(distance).filter(|(_, d)| *d <= RINGS) {
-            *factor *= 1.0 + (GROWTH - 1.0) * 0.5f64.powi(d as i32);
-        }
+        STIFFENING.raise(&distance, &mut factor);
     }
     Ok(best.map(|b| b.1))
 }
@@ -74,7 +70,7 @@ pub(super) fn assemble(problem: &OrientationProblem, factor: &[f64]) -> (SparseH
                     (hats[i] * norm * sign, terms, constant)
                 })
                 .collect();
-            // What the variables have to make up for.
+            // The constant terms of the expressions move to the right-hand side.
             let fixed = rows.iter().map(|&(hat, _, constant)| hat * constant).sum::<DVec2>();
             let residual = triangle.target(k) * norm - fixed;
             for &(hat, terms, _) in &rows {
@@ -97,14 +93,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_trade_energy_for_folds() {
+    fn stiffening_removes_flips_and_raises_the_energy() {
         let sheet = dragged(12);
         let problem = sheet.problem();
         let y = solved(&problem);
-        let before = problem.folded(&problem.reduction.expand(&y)).len();
+        let before = problem.flipped(&problem.reduction.expand(&y)).len();
         let spared = vec![false; problem.triangles.len()];
         let stiff = stiffen(&problem, &Neighbours::new(&problem), &spared, &Progress::new()).unwrap().unwrap();
-        let after = problem.folded(&problem.reduction.expand(&stiff)).len();
+        let after = problem.flipped(&problem.reduction.expand(&stiff)).len();
         assert!(before > 0 && after < before, "{before} {after}");
         assert!(problem.energy(&stiff) > problem.energy(&y));
     }

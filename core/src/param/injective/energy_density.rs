@@ -1,21 +1,36 @@
-//! The energy of a triangle per area, as a function of the matrix of its map.
+//! The energy density of a triangle as a function of the Jacobian of the map; the formula is in [`super`].
 
-use super::DistortionWeights;
+/// Weights of the energy of locally injective maps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DistortionWeights {
+    /// `ρ`: weight of gradient components across the field relative to those along it; at least 1.
+    pub anisotropy: f64,
+    /// `λ`: weight of errors of size relative to the conformal distortion; positive.
+    pub size: f64,
+}
 
-/// What the energy depends on besides the matrix.
+impl DistortionWeights {
+    /// The weights with the excess of the anisotropy over 1 scaled by `anisotropy_share`: 0 is isotropic, 1 unchanged.
+    pub(crate) fn with_anisotropy_share(self, anisotropy_share: f64) -> Self {
+        Self { anisotropy: 1.0 + anisotropy_share * (self.anisotropy - 1.0), ..self }
+    }
+}
+
+/// Parameters of the energy density of a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EnergyDensity {
     /// `ρ`.
     anisotropy: f64,
     /// `λ`.
     size: f64,
-    /// The determinant wanted, `m`.
+    /// `m`: the target determinant.
     determinant: f64,
-    /// `ε`: how far below zero, in multiples of that, determinants still have an energy worth making less; 0: none has.
-    slack: f64,
+    /// `ε`: regularisation in multiples of `m`, see [`EnergyDensity::regularised_determinant`]; 0: none, the energy of
+    /// a flipped triangle is infinite.
+    epsilon: f64,
 }
 
-/// A function of the determinant with its first and second derivative.
+/// A function of the determinant: value, first and second derivative.
 #[derive(Debug, Clone, Copy)]
 struct Jet([f64; 3]);
 
@@ -38,55 +53,57 @@ impl Jet {
     }
 }
 
-/// The energy from which on an image is as good as flat: shape cannot be told from rounding any more.
-const FLAT: f64 = 1e14;
-/// Sweeps of the Jacobi method: of 4 by 4 matrices it has converged to rounding after five.
-const SWEEPS: usize = 6;
+/// Largest energy density; beyond it the image is degenerate up to rounding errors.
+const MAX_DENSITY: f64 = 1e14;
+/// Sweeps of Jacobi's eigenvalue method. For 4 × 4 matrices it converges to rounding errors in five.
+const JACOBI_SWEEPS: usize = 6;
 
 impl EnergyDensity {
-    /// The energy of a triangle in which the gradients are to have the lengths given.
-    pub(crate) fn new(shape: DistortionWeights, [a, b]: [f64; 2]) -> Self {
-        Self { anisotropy: shape.anisotropy, size: shape.size, determinant: a * b, slack: 0.0 }
+    /// The energy density for target lengths `a` and `b` of the gradients of u and v.
+    pub(crate) fn new(weights: DistortionWeights, [a, b]: [f64; 2]) -> Self {
+        Self { anisotropy: weights.anisotropy, size: weights.size, determinant: a * b, epsilon: 0.0 }
     }
 
-    /// The same with `ε`: triangles that are turned over have a finite energy, the greater the less `ε` is.
-    pub(super) fn with_slack(self, slack: f64) -> Self {
-        Self { slack, ..self }
+    /// The density regularised with `ε`: flipped triangles have a finite energy, larger for smaller `ε`.
+    pub(super) fn regularised(self, epsilon: f64) -> Self {
+        Self { epsilon, ..self }
     }
 
+    /// Weights of the squared entries of the Jacobian.
     fn weights(&self) -> [f64; 4] {
         [1.0, self.anisotropy, self.anisotropy, 1.0]
     }
 
-    /// What stands for a determinant: itself, or with slack `½ (D + √(ε² m² + D²))`, which is positive whatever `D` is.
-    fn positive(&self, det: f64) -> Jet {
-        if self.slack == 0.0 {
+    /// `χ(D)`, used in place of the determinant `D` in denominators: `D` itself for `ε = 0`, else
+    /// `½ (D + √(ε² m² + D²))`, which is positive for every `D` (Garanzha et al. 2021).
+    fn regularised_determinant(&self, det: f64) -> Jet {
+        if self.epsilon == 0.0 {
             return Jet([det, 1.0, 0.0]);
         }
-        let least = self.slack * self.determinant;
+        let least = self.epsilon * self.determinant;
         let root = least.hypot(det);
-        // Of a negative determinant the sum would lose all digits.
+        // The second form avoids cancellation for negative determinants.
         let value = if det > 0.0 { 0.5 * (det + root) } else { 0.5 * least * least / (root - det) };
         Jet([value, value / root, 0.5 * least * least / root.powi(3)])
     }
 
-    /// `1 / D`, by which shape is multiplied, and what size costs, `λ (D²/m² + m²/D²)`.
+    /// `1 / χ(D)`, the factor of the conformal term, and the size term `λ (D²/m² + m²/χ(D)²)`.
     fn parts(&self, det: f64) -> (Jet, Jet) {
-        let inverse = self.positive(det).inverse();
+        let inverse = self.regularised_determinant(det).inverse();
         let square = self.determinant * self.determinant;
         (inverse, Jet([det, 1.0, 0.0]).squared().sum(self.size / square, inverse.squared(), self.size * square))
     }
 
-    /// The energy of the matrix `[a b; c d]`, given row by row; `None` unless its determinant is positive beyond rounding or
-    /// there is slack.
+    /// The energy density of the Jacobian `[a b; c d]`, given row by row. `None` if it is flipped or degenerate and the
+    /// density is not regularised.
     pub(crate) fn value(&self, j: &[f64; 4]) -> Option<f64> {
         let det = j[0] * j[3] - j[1] * j[2];
         let (inverse, size) = self.parts(det);
         let e = 0.5 * (self.norm(j) * inverse.0[0] + size.0[0]);
-        ((det > 0.0 || self.slack > 0.0) && e < FLAT).then_some(e)
+        ((det > 0.0 || self.epsilon > 0.0) && e < MAX_DENSITY).then_some(e)
     }
 
-    /// The determinant of a matrix in multiples of that wanted.
+    /// The determinant of a Jacobian in multiples of the target.
     pub(super) fn determinant(&self, j: &[f64; 4]) -> f64 {
         (j[0] * j[3] - j[1] * j[2]) / self.determinant
     }
@@ -96,29 +113,29 @@ impl EnergyDensity {
         self.weights().iter().zip(j).map(|(w, x)| w * x * x).sum()
     }
 
-    /// The derivatives of the energy by the entries of the matrix; of one with positive determinant, or with slack.
+    /// The derivatives by the entries of the Jacobian; its determinant must be positive unless regularised.
     pub(crate) fn gradient(&self, j: &[f64; 4]) -> [f64; 4] {
         self.derivatives(j).0
     }
 
-    /// Its gradient and its Hessian made positive semidefinite.
+    /// Gradient and Hessian by the entries of the Jacobian, the Hessian projected to positive semidefinite.
     pub(super) fn derivatives(&self, j: &[f64; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
         let det = j[0] * j[3] - j[1] * j[2];
         let turned = [j[3], -j[2], -j[1], j[0]];
         let weights = self.weights();
-        // e = ½ (N g(D) + h(D)): first and second derivatives with respect to D.
+        // e = ½ (N g(D) + h(D)) with N = jᵀ W j, g = 1/χ, h the size term: first and second derivatives by D.
         let (shape, size) = self.parts(det);
         let Jet([_, first, second]) = shape.sum(0.5 * self.norm(j), size, 0.5);
         let [factor, slope, _] = shape.0;
         let mut gradient = [0.0; 4];
         let mut hessian = [[0.0; 4]; 4];
         for r in 0..4 {
-            let pull = weights[r] * j[r];
-            gradient[r] = pull * factor + first * turned[r];
+            let half_slope = weights[r] * j[r];
+            gradient[r] = half_slope * factor + first * turned[r];
             hessian[r][r] += weights[r] * factor;
             for c in 0..4 {
                 hessian[r][c] += second * turned[r] * turned[c];
-                hessian[r][c] += slope * (pull * turned[c] + turned[r] * weights[c] * j[c]);
+                hessian[r][c] += slope * (half_slope * turned[c] + turned[r] * weights[c] * j[c]);
             }
         }
         for (r, sign) in [1.0, -1.0, -1.0, 1.0].into_iter().enumerate() {
@@ -128,7 +145,7 @@ impl EnergyDensity {
     }
 }
 
-/// The nearest positive semidefinite matrix: negative eigenvalues become zero (Jacobi's method).
+/// The nearest positive semidefinite matrix: sets negative eigenvalues to zero (Jacobi's method).
 fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     if is_definite(&matrix) {
         return matrix;
@@ -138,7 +155,7 @@ fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     for (i, row) in v.iter_mut().enumerate() {
         row[i] = 1.0;
     }
-    for _ in 0..SWEEPS {
+    for _ in 0..JACOBI_SWEEPS {
         for p in 0..3 {
             for q in p + 1..4 {
                 rotate(&mut a, &mut v, p, q);
@@ -157,7 +174,8 @@ fn semidefinite(matrix: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     out
 }
 
-/// Whether a symmetric matrix has a Cholesky factor: most have, and this is quicker than to find eigenvalues.
+/// Whether a symmetric matrix is positive definite, by Cholesky factorisation. This is true in most cases and cheaper
+/// to test than computing eigenvalues.
 fn is_definite(matrix: &[[f64; 4]; 4]) -> bool {
     let mut l = [[0.0; 4]; 4];
     for r in 0..4 {
@@ -176,7 +194,7 @@ fn is_definite(matrix: &[[f64; 4]; 4]) -> bool {
     true
 }
 
-/// Makes entry `(p, q)` of a symmetric matrix vanish; `v` collects the rotations.
+/// Jacobi rotation: makes entry `(p, q)` of a symmetric matrix vanish; `v` accumulates the rotations.
 fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
@@ -200,12 +218,12 @@ fn rotate(a: &mut [[f64; 4]; 4], v: &mut [[f64; 4]; 4], p: usize, q: usize) {
 mod tests {
     use super::*;
 
-    const DENSITY: EnergyDensity = EnergyDensity { anisotropy: 3.0, size: 0.4, determinant: 2.0, slack: 0.0 };
+    const DENSITY: EnergyDensity = EnergyDensity { anisotropy: 3.0, size: 0.4, determinant: 2.0, epsilon: 0.0 };
 
     #[test]
-    fn the_gradient_is_that_of_the_energy() {
-        let folded = [1.1, 0.3, 2.4, -0.9];
-        for (density, at) in [(DENSITY, [1.1, 0.3, -0.4, 0.9]), (DENSITY.with_slack(0.3), folded)] {
+    fn gradient_matches_finite_differences() {
+        let flipped = [1.1, 0.3, 2.4, -0.9];
+        for (density, at) in [(DENSITY, [1.1, 0.3, -0.4, 0.9]), (DENSITY.regularised(0.3), flipped)] {
             let (gradient, _) = density.derivatives(&at);
             for k in 0..4 {
                 let moved = |d: f64| {
@@ -220,10 +238,10 @@ mod tests {
     }
 
     #[test]
-    fn the_hessian_is_that_of_the_energy_where_it_is_convex() {
-        // At the best matrix conceivable nothing is cut off.
+    fn hessian_matches_finite_differences_where_convex() {
+        // At the minimum no eigenvalue is negative.
         let at = [2f64.sqrt(), 0.0, 0.0, 2f64.sqrt()];
-        for density in [DENSITY, DENSITY.with_slack(0.1)] {
+        for density in [DENSITY, DENSITY.regularised(0.1)] {
             let (_, hessian) = density.derivatives(&at);
             for c in 0..4 {
                 let moved = |d: f64| {
@@ -241,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn negative_eigenvalues_become_zero_and_others_stay() {
+    fn projection_sets_only_negative_eigenvalues_to_zero() {
         let indefinite = [[1.0, 2.0, 0.0, 0.0], [2.0, 1.0, 0.0, 0.0], [0.0, 0.0, 5.0, 0.0], [0.0, 0.0, 0.0, -1.0]];
         let want = [[1.5, 1.5, 0.0, 0.0], [1.5, 1.5, 0.0, 0.0], [0.0, 0.0, 5.0, 0.0], [0.0; 4]];
         let got = semidefinite(indefinite);
@@ -253,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_folded_matrices_have_no_energy() {
+    fn degenerate_and_flipped_jacobians_have_no_energy() {
         assert_eq!(DENSITY.value(&[1.0, 1.0, 1.0, 1.0]), None);
         assert_eq!(DENSITY.value(&[1.0, 0.0, 0.0, -1.0]), None);
     }

@@ -1,83 +1,85 @@
-//! Regions between drawn arcs, and the directions of arcs in them.
+//! Partial embeddings: the regions between embedded arcs, and the headings of arcs in them.
 //!
-//! In a chart of a region every arc runs along one of four directions. Going around the region with it to the left,
-//! the direction changes at nodes only: a corner that spans `m` quarter sectors turns by `2 − m` quarters. A disc
-//! without singularity inside turns by four quarters in all (Campen, section 6.3.1: the turning numbers). So the
-//! valences and slots, checked by this sum, determine the directions of all arcs, however many of them are missing,
-//! as long as every region is a disc. Where none is missing, every region has four corners of one sector: a patch.
+//! In a chart of a region every arc has one of four headings. Around the region, with the region to the left, the
+//! heading changes at nodes only: a corner that spans `m` quarter sectors turns by `2 − m` quarter turns. The turns
+//! around a disc without singularity sum to four (Campen, section 6.3.1: turning numbers). Valences and slots therefore
+//! determine the headings of all arcs, however many arcs are missing, provided that every region is a disc. In a
+//! complete layout every region has four corners of one sector: it is a patch.
 
 use std::collections::HashMap;
 
-use super::draw::Drawn;
-use super::{ArcEnd, LayoutFile, PartialEmbeddingError};
+use super::error::PartialEmbeddingError;
+use super::format::{ArcEnd, LayoutFile};
+use super::insertion::InsertedLayout;
 use crate::dual::{Mark, RefinedMesh, next};
-use crate::layout::initial_embedding::{Embedding, lengths};
+use crate::layout::embedding::{Embedding, path_lengths};
 use crate::layout::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
-use crate::mesh::FaceId;
+use crate::mesh::{FaceId, components};
 
 /// A corner of a region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PartialCorner {
     /// The node.
     pub node: u32,
-    /// Place in the border of the half-edge that leaves the node.
+    /// Index in the border of the half-edge that leaves the node.
     pub at: usize,
-    /// How many quarter sectors of the node lie in the region here.
+    /// Number of quarter sectors of the node that the corner spans.
     pub sectors: u32,
 }
 
 impl PartialCorner {
-    /// By how many quarters the border turns here, to the left.
+    /// The turn of the border to the left, in quarter turns.
     pub fn turn(&self) -> i64 {
         2 - i64::from(self.sectors)
     }
 }
 
-/// A region between arcs, an open disc.
+/// A region between arcs; an open disc.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartialRegion {
-    /// The half-edges around it in order, with the region to the left; an arc with the region on both its sides
-    /// occurs in both directions.
+    /// The half-edges around it in order, with the region to the left. An arc with the region on both sides occurs in
+    /// both directions.
     pub border: Vec<u32>,
-    /// Its corners, in the order of the border.
+    /// Its corners in the order of the border.
     pub corners: Vec<PartialCorner>,
 }
 
-/// A layout, complete or not, drawn on a refinement of the surface.
+/// A layout, complete or partial, embedded on a refinement of the surface.
 #[derive(Debug, Clone)]
 pub struct PartialEmbedding {
-    /// The surface, with all arcs as edge paths marked [`Mark::Arc`].
+    /// The refined surface; the edges of arcs are marked [`Mark::Arc`].
     pub mesh: RefinedMesh,
     /// Triangle of the original mesh that each face lies in.
     pub base_face: Vec<u32>,
     /// Vertex of each node.
     pub nodes: Vec<u32>,
     /// Valence of each node, and whether it lies on the boundary.
-    pub kinds: Vec<Node>,
-    /// Vertices of each arc, from its first end to its second. The file's arcs come first; those after them lie on
-    /// the boundary where the file left them out.
+    pub layout_nodes: Vec<Node>,
+    /// Vertices of each arc, from its first end to its second. Arcs of the file come first, boundary arcs that it omits
+    /// last.
     pub arcs: Vec<Vec<u32>>,
     /// Nodes and slots at the ends of each arc.
     pub ends: Vec<[ArcEnd; 2]>,
-    /// Per half-edge on an arc or on the boundary: the direction, 0 to 3, along which it runs in the chart of the
-    /// region to its left. The first half-edge of each region's border has direction 0.
+    /// Heading, 0 to 3, of each half-edge on an arc or on the boundary, in the chart of the region to its left. The
+    /// first half-edge of each region's border has heading 0.
     pub headings: Vec<Option<u8>>,
     /// Region of each face.
     pub region: Vec<u32>,
-    /// All regions, by their first face.
+    /// All regions, in the order of their first faces.
     pub regions: Vec<PartialRegion>,
 }
 
 impl PartialEmbedding {
-    pub(super) fn new(file: &LayoutFile, drawn: Drawn) -> Result<Self, PartialEmbeddingError> {
-        let Drawn { mesh, nodes, arcs, ends } = drawn;
-        let kinds = nodes.iter().zip(&file.nodes).map(|(&v, n)| {
+    /// Determines the regions and headings of an inserted layout.
+    pub(super) fn new(file: &LayoutFile, inserted: InsertedLayout) -> Result<Self, PartialEmbeddingError> {
+        let InsertedLayout { mesh, nodes, arcs, ends } = inserted;
+        let layout_nodes = nodes.iter().zip(&file.nodes).map(|(&v, n)| {
             let boundary = mesh.is_boundary(mesh.outgoing(v)[0]);
             Node { valence: n.valence as usize, boundary }
         });
         let mut this = Self {
             base_face: (0..mesh.n_faces() as u32).map(|f| mesh.base_face(f)).collect(),
-            kinds: kinds.collect(),
+            layout_nodes: layout_nodes.collect(),
             ends,
             headings: vec![None; 3 * mesh.n_faces()],
             region: Vec::new(),
@@ -92,10 +94,10 @@ impl PartialEmbedding {
         Ok(this)
     }
 
-    /// Whether the slots of arc `a` are those of an arc along the boundary.
+    /// Whether arc `a` has the slots of a boundary arc.
     fn is_boundary_arc(&self, a: usize) -> bool {
         let [p, q] = self.ends[a];
-        let kind = |end: ArcEnd| &self.kinds[end.node as usize];
+        let kind = |end: ArcEnd| &self.layout_nodes[end.node as usize];
         let last = |end: ArcEnd| end.slot as usize == kind(end).valence;
         kind(p).boundary && kind(q).boundary && ((p.slot == 0 && last(q)) || (q.slot == 0 && last(p)))
     }
@@ -105,7 +107,7 @@ impl PartialEmbedding {
         self.mesh.mark(h) != Mark::Free || self.mesh.is_boundary(h)
     }
 
-    /// Checks that boundary arcs run along the boundary all the way, and others keep off it.
+    /// Checks that boundary arcs run along the boundary and that others do not touch it.
     fn check_boundary(&self) -> Result<(), PartialEmbeddingError> {
         for (a, path) in self.arcs.iter().enumerate() {
             let arc = a as u32;
@@ -127,8 +129,8 @@ impl PartialEmbedding {
         Ok(())
     }
 
-    /// The slot in which each edge leaves its node, by the edge's two vertices; at boundary nodes also those of the
-    /// boundary edges, whether there are arcs or not.
+    /// The slot of each edge that leaves a node along an arc, by the edge's two vertices; at boundary nodes also of the
+    /// boundary edges.
     fn slots(&self) -> Result<HashMap<(u32, u32), u32>, PartialEmbeddingError> {
         let mut of_edge = HashMap::new();
         for (a, (path, ends)) in self.arcs.iter().zip(&self.ends).enumerate() {
@@ -136,7 +138,7 @@ impl PartialEmbedding {
             of_edge.insert((path[path.len() - 1], path[path.len() - 2]), (ends[1].slot, a as u32));
         }
         let mut slots: HashMap<(u32, u32), u32> = of_edge.iter().map(|(&edge, &(slot, _))| (edge, slot)).collect();
-        for (node, (&v, kind)) in self.nodes.iter().zip(&self.kinds).enumerate() {
+        for (node, (&v, kind)) in self.nodes.iter().zip(&self.layout_nodes).enumerate() {
             let neighbours = self.mesh.neighbours(v);
             let found: Vec<(usize, u32, u32)> = neighbours
                 .iter()
@@ -148,7 +150,7 @@ impl PartialEmbedding {
                 let last = neighbours.len() - 1;
                 slots.insert((v, neighbours[0]), 0);
                 slots.insert((v, neighbours[last]), valence);
-                // The outer slots belong to the boundary edges, and to nothing else.
+                // The outer slots are those of the boundary edges only.
                 found.iter().all(|&(i, slot, _)| (i == 0) == (slot == 0) && (i == last) == (slot == valence))
                     && found.windows(2).all(|w| w[0].1 < w[1].1)
             } else if found.is_empty() {
@@ -165,8 +167,9 @@ impl PartialEmbedding {
         Ok(slots)
     }
 
+    /// Finds the regions, checks that they are discs with the right turning, and sets the headings.
     fn find_regions(&mut self, slots: &HashMap<(u32, u32), u32>) -> Result<(), PartialEmbeddingError> {
-        let count = self.flood();
+        let count = self.number_regions();
         let euler = self.euler(count);
         let mut starts = vec![None; count];
         for h in (0..3 * self.mesh.n_faces() as u32).rev().filter(|&h| self.is_border(h)) {
@@ -184,37 +187,22 @@ impl PartialEmbedding {
                 let (face, arcs) = self.bounds(r as u32);
                 return Err(PartialEmbeddingError::Turning { region: r as u32, face, arcs, quarters });
             }
-            self.head(&region);
+            self.set_headings(&region);
             self.regions.push(region);
         }
         Ok(())
     }
 
-    /// Numbers the regions; returns how many there are.
-    fn flood(&mut self) -> usize {
-        let mut region = vec![u32::MAX; self.mesh.n_faces()];
-        let mut count = 0;
-        for seed in 0..self.mesh.n_faces() as u32 {
-            if region[seed as usize] != u32::MAX {
-                continue;
-            }
-            region[seed as usize] = count;
-            let mut stack = vec![seed];
-            while let Some(f) = stack.pop() {
-                for t in (3 * f..3 * f + 3).filter(|&h| !self.is_border(h)).filter_map(|h| self.mesh.twin(h)) {
-                    if region[t as usize / 3] == u32::MAX {
-                        region[t as usize / 3] = count;
-                        stack.push(t / 3);
-                    }
-                }
-            }
-            count += 1;
-        }
+    /// Numbers the regions; returns their number.
+    fn number_regions(&mut self) -> usize {
+        let beyond =
+            |f: u32| (3 * f..3 * f + 3).filter(|&h| !self.is_border(h)).filter_map(|h| Some(self.mesh.twin(h)? / 3));
+        let (region, count) = components(self.mesh.n_faces(), beyond);
         self.region = region;
-        count as usize
+        count
     }
 
-    /// The Euler characteristic of each region without its border; 1 exactly for a disc.
+    /// The Euler characteristic of each region without its border; 1 for a disc only.
     fn euler(&self, count: usize) -> Vec<i64> {
         let mut euler = vec![0; count];
         let mut inner = vec![true; self.mesh.n_vertices()];
@@ -238,7 +226,7 @@ impl PartialEmbedding {
         euler
     }
 
-    /// A triangle of the original mesh in region `r`, and the arcs around it.
+    /// A triangle of the original mesh in region `r`, and the arcs on its border.
     fn bounds(&self, r: u32) -> (FaceId, Vec<u32>) {
         let faces = (0..self.mesh.n_faces() as u32).filter(|&f| self.region[f as usize] == r);
         let mut arcs: Vec<u32> = faces
@@ -254,7 +242,7 @@ impl PartialEmbedding {
         (FaceId(faces.map(|f| self.base_face[f as usize]).next().unwrap_or(0)), arcs)
     }
 
-    /// The border of a disc from half-edge `start` on.
+    /// The border and the corners of a disc, from half-edge `start` on.
     fn walk(&self, start: u32, slots: &HashMap<(u32, u32), u32>, node_at: &HashMap<u32, u32>) -> PartialRegion {
         let mut region = PartialRegion { border: vec![start], corners: Vec::new() };
         loop {
@@ -266,9 +254,9 @@ impl PartialEmbedding {
             let v = self.mesh.origin(leaving);
             let at = if leaving == start { 0 } else { region.border.len() };
             if let Some(&node) = node_at.get(&v) {
-                let kind = &self.kinds[node as usize];
+                let kind = &self.layout_nodes[node as usize];
                 let slot = |w: u32| slots.get(&(v, w)).copied().map_or(0, i64::from);
-                // From the edge that leaves, counter-clockwise to the one that arrives.
+                // Counter-clockwise from the leaving to the arriving edge.
                 let span = slot(self.mesh.origin(arriving)) - slot(self.mesh.target(leaving));
                 let valence = kind.valence as i64;
                 let sectors = if kind.boundary || span > 0 { span } else { span + valence };
@@ -283,8 +271,8 @@ impl PartialEmbedding {
         region
     }
 
-    /// Notes the directions along the border of a region.
-    fn head(&mut self, region: &PartialRegion) {
+    /// Sets the headings along the border of a region.
+    fn set_headings(&mut self, region: &PartialRegion) {
         let mut heading = 0;
         let mut corners = region.corners.iter().skip_while(|c| c.at == 0).peekable();
         for (i, &h) in region.border.iter().enumerate() {
@@ -295,21 +283,21 @@ impl PartialEmbedding {
         }
     }
 
-    /// Whether no arc is missing.
+    /// Whether the layout is complete.
     pub fn is_complete(&self) -> bool {
         self.regions.iter().flat_map(|r| &r.corners).all(|c| c.sectors == 1)
     }
 
-    /// The layout and its embedding, with region `p` as patch `p`. Where arcs are missing it has no patches, every arc
-    /// is a chord of its own, and the embedding's seeds are those of the regions.
+    /// The layout and its embedding; region `p` is patch `p`. A partial layout has no patches, every arc is a chord of
+    /// its own, and the embedding has a seed per region.
     ///
     /// # Errors
     ///
-    /// [`LayoutError`], should the parts not fit together, which would be a defect of this module.
+    /// [`LayoutError`] if the layout is invalid. This is a defect of this module.
     pub fn to_embedding(&self) -> Result<(QuadLayout, Embedding), LayoutError> {
         let arc =
             |a: usize| Arc { nodes: self.ends[a].map(|e| e.node), boundary: self.is_boundary_arc(a), chord: a as u32 };
-        let (nodes, arcs) = (self.kinds.clone(), (0..self.arcs.len()).map(arc).collect());
+        let (nodes, arcs) = (self.layout_nodes.clone(), (0..self.arcs.len()).map(arc).collect());
         let layout = if self.is_complete() {
             QuadLayout::new(nodes, arcs, self.patches()?, self.surface_euler())?
         } else {
@@ -318,7 +306,7 @@ impl PartialEmbedding {
         Ok((layout, self.embedding()))
     }
 
-    /// The heading of each arc in the region to its left, run through forward and backward.
+    /// The heading of each arc in the region to its left, traversed forward and backward.
     pub fn arc_headings(&self) -> Vec<[Option<u8>; 2]> {
         let heading = |from: u32, to: u32| {
             let h = self.mesh.outgoing(from).into_iter().find(|&h| self.mesh.target(h) == to)?;
@@ -330,16 +318,16 @@ impl PartialEmbedding {
     /// The regions of a complete layout as patches.
     fn patches(&self) -> Result<Vec<Patch>, LayoutError> {
         let patch = |(patch, region): (usize, &PartialRegion)| {
-            let broken = LayoutError::Patch { patch };
-            let corners = <[PartialCorner; 4]>::try_from(region.corners.clone()).map_err(|_| broken.clone())?;
-            let side = |c: PartialCorner| self.side(region.border[c.at]).ok_or(broken.clone());
+            let invalid = LayoutError::Patch { patch };
+            let corners = <[PartialCorner; 4]>::try_from(region.corners.clone()).map_err(|_| invalid.clone())?;
+            let side = |c: PartialCorner| self.side(region.border[c.at]).ok_or(invalid.clone());
             let [a, b, c, d] = corners.map(side);
             Ok(Patch { corners: corners.map(|c| c.node), sides: [a?, b?, c?, d?] })
         };
         self.regions.iter().enumerate().map(patch).collect()
     }
 
-    /// The arc along a half-edge that leaves a node, and whether it runs in its direction.
+    /// The arc along a half-edge that leaves a node, and whether the half-edge runs in the direction of the arc.
     fn side(&self, h: u32) -> Option<(u32, bool)> {
         let Mark::Arc(a) = self.mesh.mark(h) else { return None };
         let path = &self.arcs[a as usize];
@@ -358,7 +346,7 @@ impl PartialEmbedding {
             base_face: self.base_face.clone(),
             nodes: self.nodes.clone(),
             arcs: self.arcs.clone(),
-            arc_parameters: self.arcs.iter().map(|path| lengths(&self.mesh.positions, path)).collect(),
+            arc_parameters: self.arcs.iter().map(|path| path_lengths(&self.mesh.positions, path)).collect(),
             seeds: self.regions.iter().map(|r| r.border[0] / 3).collect(),
         }
     }

@@ -1,60 +1,60 @@
-//! Which parts of two layouts are the same, where one is the other with its parts numbered anew.
+//! Isomorphisms of layouts: corresponding nodes, arcs and patches of two layouts with the same structure.
 //!
-//! One patch laid onto another fixes all that hangs together with it: patches, arcs and nodes are followed from side to
-//! side. Where a layout has symmetries several ways fit, and the one is taken whose patches lie nearest. Which chords are
-//! the same is known.
+//! A pair of corresponding patches determines the isomorphism of their connected component, since patches are followed
+//! across arcs. For a symmetric layout several isomorphisms exist; the one with the smallest sum of distances between
+//! corresponding patches is chosen. The correspondence of chords is given.
 
 use super::structure::QuadLayout;
 
-/// For each part of a layout the same part of another.
+/// For each node, arc and patch of a layout the corresponding one of another layout.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Matching {
+pub(super) struct Isomorphism {
     pub nodes: Vec<u32>,
-    /// With each arc, whether it has the same direction.
+    /// With each arc, whether both have the same direction.
     pub arcs: Vec<(u32, bool)>,
     pub patches: Vec<u32>,
 }
 
-/// The matching of two layouts whose patches lie nearest by `distance`, where each of `chords` is for one of ours the same
-/// of theirs; `None` if they are not the same.
-pub(super) fn matching(
+/// The isomorphism from `ours` to `theirs` with the smallest sum of `distance` between corresponding patches. `chords`
+/// gives for each chord of `ours` the chord of `theirs`. `None` if the layouts are not isomorphic.
+pub(super) fn isomorphism(
     ours: &QuadLayout,
     theirs: &QuadLayout,
     chords: &[u32],
     distance: impl Fn(usize, usize) -> f64,
-) -> Option<Matching> {
+) -> Option<Isomorphism> {
     let count = |l: &QuadLayout| (l.nodes.len(), l.arcs.len(), l.patches.len());
     if count(ours) != count(theirs) {
         return None;
     }
     let pair = Pair { ours, theirs, chords, ours_at: directed_arcs(ours), theirs_at: directed_arcs(theirs) };
-    let mut found = Found {
+    let mut found = PartialIsomorphism {
         nodes: vec![None; ours.nodes.len()],
         arcs: vec![None; ours.arcs.len()],
         patches: vec![None; ours.patches.len()],
         taken: vec![false; ours.patches.len()],
     };
-    // Once for every component of the surface.
+    // One iteration per connected component.
     while let Some(first) = found.patches.iter().position(Option::is_none) {
-        let ways = (0..theirs.patches.len() as u32).flat_map(|q| (0..4).map(move |turn| (q, turn)));
-        let laid = ways.filter_map(|(q, turn)| {
-            let mut way = found.clone();
-            let added = way.lay(&pair, first as u32, q, turn)?;
-            Some((added.iter().map(|&(p, q)| distance(p as usize, q as usize)).sum::<f64>(), way))
+        let starts = (0..theirs.patches.len() as u32).flat_map(|q| (0..4).map(move |turn| (q, turn)));
+        let candidates = starts.filter_map(|(q, turn)| {
+            let mut candidate = found.clone();
+            let added = candidate.extend(&pair, first as u32, q, turn)?;
+            Some((added.iter().map(|&(p, q)| distance(p as usize, q as usize)).sum::<f64>(), candidate))
         });
-        found = laid.min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        found = candidates.min_by(|a, b| a.0.total_cmp(&b.0))?.1;
     }
-    Some(Matching {
+    Some(Isomorphism {
         nodes: found.nodes.into_iter().collect::<Option<_>>()?,
         arcs: found.arcs.into_iter().collect::<Option<_>>()?,
         patches: found.patches.into_iter().map(|p| Some(p?.0)).collect::<Option<_>>()?,
     })
 }
 
-/// Where a directed arc has a patch to its left: the patch and its side.
+/// The patch to the left of a directed arc, and its side.
 type Side = Option<(u32, usize)>;
 
-/// The two layouts, which of their chords are the same, and where the arcs are found, backward and forward.
+/// The two layouts, their corresponding chords, and the patches beside their arcs, run through backward and forward.
 struct Pair<'l> {
     ours: &'l QuadLayout,
     theirs: &'l QuadLayout,
@@ -63,6 +63,7 @@ struct Pair<'l> {
     theirs_at: Vec<[Side; 2]>,
 }
 
+/// For each arc, run through backward and forward, the patch to the left.
 fn directed_arcs(layout: &QuadLayout) -> Vec<[Side; 2]> {
     let mut found = vec![[None; 2]; layout.arcs.len()];
     for (p, patch) in (0..).zip(&layout.patches) {
@@ -73,21 +74,21 @@ fn directed_arcs(layout: &QuadLayout) -> Vec<[Side; 2]> {
     found
 }
 
-/// What is matched so far.
+/// A partial isomorphism.
 #[derive(Clone)]
-struct Found {
+struct PartialIsomorphism {
     nodes: Vec<Option<u32>>,
     arcs: Vec<Option<(u32, bool)>>,
-    /// With each patch, which side of the other its first side is.
+    /// With each patch, the side that corresponds to its first side.
     patches: Vec<Option<(u32, usize)>>,
-    /// Which of the other's patches are matched.
+    /// Which patches of the other layout correspond to one.
     taken: Vec<bool>,
 }
 
-impl Found {
-    /// Lays patch `p` onto patch `q`, its first side onto side `turn`, and all that hangs together with it; tells which
-    /// patches that were. `None` if it does not fit.
-    fn lay(&mut self, pair: &Pair<'_>, p: u32, q: u32, turn: usize) -> Option<Vec<(u32, u32)>> {
+impl PartialIsomorphism {
+    /// Maps patch `p` to patch `q`, its first side to side `turn`, and extends the map to the connected component.
+    /// Returns the pairs of patches added; `None` on a contradiction.
+    fn extend(&mut self, pair: &Pair<'_>, p: u32, q: u32, turn: usize) -> Option<Vec<(u32, u32)>> {
         let mut added = Vec::new();
         let mut stack = vec![(p, q, turn)];
         while let Some((p, q, turn)) = stack.pop() {
@@ -148,7 +149,7 @@ mod tests {
         QuadLayout::new(nodes, arcs, patches, 0).expect("valid")
     }
 
-    /// The layout with its parts in the reverse order, every other arc turned around and every patch turned.
+    /// The layout with its elements in reverse order, every second arc reversed and the sides of patches rotated.
     fn renumbered(layout: &QuadLayout) -> QuadLayout {
         let (n, m) = (layout.nodes.len() as u32, layout.arcs.len() as u32);
         let turned = |a: u32| a % 2 == 1;
@@ -178,11 +179,11 @@ mod tests {
     }
 
     #[test]
-    fn a_layout_is_found_again_whatever_its_numbers_and_symmetries() {
+    fn renumbered_layout_is_matched_despite_symmetries() {
         let ours = torus(3, 5);
         let theirs = renumbered(&ours);
         let last = ours.patches.len() - 1;
-        let found = matching(&ours, &theirs, &chords(&ours, &theirs), |p, q| p.abs_diff(last - q) as f64);
+        let found = isomorphism(&ours, &theirs, &chords(&ours, &theirs), |p, q| p.abs_diff(last - q) as f64);
         let found = found.expect("the same layout");
         assert!(found.patches.iter().enumerate().all(|(p, &q)| q as usize == last - p));
         assert!(found.nodes.iter().enumerate().all(|(n, &v)| v as usize == last - n));
@@ -192,12 +193,12 @@ mod tests {
     }
 
     #[test]
-    fn another_layout_is_not_matched() {
+    fn different_layouts_are_not_isomorphic() {
         let (ours, theirs) = (torus(3, 4), torus(2, 6));
         let all = vec![0; ours.chords];
-        assert_eq!(matching(&ours, &theirs, &all, |_, _| 0.0), None);
+        assert_eq!(isomorphism(&ours, &theirs, &all, |_, _| 0.0), None);
         let turned = torus(4, 3);
         let chords: Vec<u32> = (0..ours.chords as u32).collect();
-        assert_eq!(matching(&ours, &turned, &chords, |_, _| 0.0), None);
+        assert_eq!(isomorphism(&ours, &turned, &chords, |_, _| 0.0), None);
     }
 }

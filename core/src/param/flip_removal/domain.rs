@@ -1,19 +1,21 @@
-//! Parts of a surface around folds, and what may move in them.
+//! Domains of local optimisation around flipped triangles.
 //!
-//! A domain is a set of triangles grown from folded ones. Its inner variables are the free ones that occur in no
-//! other triangle, so that moving them leaves all the rest of the map in place. Translations of seams and the
-//! coordinates of related points occur far apart: they move with the whole surface only.
+//! A domain is a set of triangles grown from flipped ones. Its inner variables are the free variables that occur in no
+//! other triangle; changing them leaves the rest of the map in place. Translations of seams and variables shared by a
+//! coordinate constraint occur in distant triangles: they are inner variables of the whole surface only.
 
-use super::OrientationProblem;
+use super::problem::OrientationProblem;
+use crate::mesh::BreadthFirst;
+use crate::param::stiffening::ring_distances;
 
-/// Triangles and the free variables that occur in them alone, both ascending.
+/// Triangles and their inner variables, both ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Domain {
     pub triangles: Vec<u32>,
     pub inner: Vec<u32>,
 }
 
-/// Which triangles meet at each vertex, and in how many each free variable occurs.
+/// The triangles at each vertex, and the number of triangles in which each free variable occurs.
 #[derive(Debug)]
 pub(super) struct Neighbours {
     start: Vec<u32>,
@@ -41,7 +43,7 @@ impl Neighbours {
         }
         let mut occurrences = vec![0; problem.reduction.n_free()];
         for t in 0..problem.triangles.len() as u32 {
-            for y in variables(problem, t) {
+            for y in problem.variables(t) {
                 occurrences[y as usize] += 1;
             }
         }
@@ -57,50 +59,33 @@ impl Neighbours {
         &self.around[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
     }
 
-    /// The distance of each triangle from `seeds` in rings, 0 for the seeds; `u32::MAX` beyond `rings`.
+    /// The distance of each triangle from `seeds` in rings of triangles that share a vertex: 0 for the seeds,
+    /// `u32::MAX` beyond `rings`.
     pub fn distance(&self, problem: &OrientationProblem, seeds: &[u32], rings: u32) -> Vec<u32> {
-        let mut distance = vec![u32::MAX; problem.triangles.len()];
-        for &t in seeds {
-            distance[t as usize] = 0;
-        }
-        let mut front = seeds.to_vec();
-        for ring in 1..=rings {
-            let mut next = Vec::new();
-            for &t in &front {
-                for &s in problem.triangles[t as usize].vertices.iter().flat_map(|&v| self.around(v)) {
-                    if distance[s as usize] == u32::MAX {
-                        distance[s as usize] = ring;
-                        next.push(s);
-                    }
-                }
-            }
-            front = next;
-        }
-        distance
+        let around =
+            |t: u32| problem.triangles[t as usize].vertices.into_iter().flat_map(|v| self.around(v).iter().copied());
+        ring_distances(problem.triangles.len(), seeds, rings, around)
     }
 
-    /// The surroundings of `seeds` up to some rings, those that touch as one domain.
+    /// The neighbourhoods of `seeds` up to a number of rings; neighbourhoods that touch are one domain.
     pub fn domains(&self, problem: &OrientationProblem, seeds: &[u32], rings: u32) -> Vec<Domain> {
         let distance = self.distance(problem, seeds, rings);
-        let mut seen = vec![false; problem.triangles.len()];
+        let mut search = BreadthFirst::new(problem.triangles.len());
         let mut count = vec![0; self.occurrences.len()];
         let mut out = Vec::new();
         for &seed in seeds {
-            if seen[seed as usize] {
+            let first = search.reached().len();
+            if !search.start(seed) {
                 continue;
             }
-            seen[seed as usize] = true;
-            let mut triangles = vec![seed];
-            let mut next = 0;
-            while next < triangles.len() {
-                for &s in problem.triangles[triangles[next] as usize].vertices.iter().flat_map(|&v| self.around(v)) {
-                    if distance[s as usize] != u32::MAX && !seen[s as usize] {
-                        seen[s as usize] = true;
-                        triangles.push(s);
+            while let Some(t) = search.visit() {
+                for &s in problem.triangles[t as usize].vertices.iter().flat_map(|&v| self.around(v)) {
+                    if distance[s as usize] != u32::MAX {
+                        search.reach(s, ());
                     }
                 }
-                next += 1;
             }
+            let mut triangles = search.reached()[first..].to_vec();
             triangles.sort_unstable();
             let inner = self.inner(problem, &triangles, &mut count);
             out.push(Domain { triangles, inner });
@@ -114,11 +99,11 @@ impl Neighbours {
         Domain { triangles, inner }
     }
 
-    /// The variables that occur in `triangles` only; `count` is all zero before and after.
+    /// The variables that occur in `triangles` only. `count` must be zero; it is zero again on return.
     fn inner(&self, problem: &OrientationProblem, triangles: &[u32], count: &mut [u32]) -> Vec<u32> {
         let mut touched = Vec::new();
         for &t in triangles {
-            for y in variables(problem, t) {
+            for y in problem.variables(t) {
                 if count[y as usize] == 0 {
                     touched.push(y);
                 }
@@ -132,14 +117,4 @@ impl Neighbours {
         }
         inner
     }
-}
-
-/// The free variables that occur in a triangle, each once.
-pub(super) fn variables(problem: &OrientationProblem, t: u32) -> Vec<u32> {
-    let corners = problem.triangles[t as usize].corners.iter().flatten();
-    let mut out: Vec<u32> =
-        corners.flat_map(|&(x, _)| problem.reduction.expression(x as usize).0.iter().map(|term| term.0)).collect();
-    out.sort_unstable();
-    out.dedup();
-    out
 }

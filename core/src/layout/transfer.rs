@@ -1,39 +1,42 @@
-//! A drawn layout drawn again on another mesh of the same surface.
+//! Transfer of an embedded layout to another mesh of the same surface.
 //!
-//! What is carried from mesh to mesh are the curves dual to the layout: closed, or from boundary to boundary, each can go
-//! by itself. If they cross there as they did here, their dual is the same layout, and it is drawn there as any woven
-//! one; its parts only have to be told apart.
+//! The curves dual to the layout are transferred one by one, and a layout dual to their arrangement gets an initial
+//! embedding on the other mesh. If the curves cross there in the same order, that layout is isomorphic to the given
+//! one, and its elements are renumbered accordingly. Otherwise the transfer fails.
 
 use glam::DVec3;
 
-use super::dual::{Dual, DualCurve};
-use super::initial_embedding::{Embedding, embed};
-use super::matching::{Matching, matching};
-use super::redraw::ReembeddingError;
+use super::dual_curves::{DualCurve, DualCurves};
+use super::embedding::Embedding;
+use super::initial_embedding::initial_embedding;
+use super::isomorphism::{Isomorphism, isomorphism};
+use super::reembedding::ReembeddingError;
 use super::structure::QuadLayout;
 use crate::dual::{Arrangement, Mark, RefinedMesh, remove_bigons};
 use crate::mesh::{TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
 
-/// Draws `layout`, drawn as `drawing` on a surface of `n_surface` vertices, on the mesh `to`: `carried` is a line of that
-/// surface on `to`, `place` a vertex of `to` at which a node should lie. `None` if the layout is another one there.
+/// Transfers `layout`, embedded as `embedding` on a surface of `n_surface` vertices, to the mesh `to`.
+///
+/// `transferred` maps a curve of that surface to `to`; `position` gives a vertex of `to` at which a node should lie.
+/// `None` if a curve cannot be transferred or the curves do not cross in the same order.
 ///
 /// # Errors
 ///
 /// See [`ReembeddingError`].
-pub fn carry(
-    (layout, drawing, n_surface): (&QuadLayout, &Embedding, usize),
+pub fn transfer_embedding(
+    (layout, embedding, n_surface): (&QuadLayout, &Embedding, usize),
     to: &TriMesh,
-    carried: impl Fn(&DualCurve) -> Option<SurfaceCurve>,
-    place: impl Fn(usize) -> Option<VertexId>,
+    transferred: impl Fn(&DualCurve) -> Option<SurfaceCurve>,
+    position: impl Fn(usize) -> Option<VertexId>,
     progress: &Progress,
 ) -> Result<Option<Embedding>, ReembeddingError> {
-    let here = Dual::new(layout, drawing, &vec![false; layout.chords], n_surface, progress)?;
+    let here = DualCurves::new(layout, embedding, &vec![false; layout.chords], n_surface, progress)?;
     let mut curves = Vec::with_capacity(layout.chords);
     for chord in 0..layout.chords as u32 {
         progress.check()?;
-        match carried(&here.line(chord)) {
+        match transferred(&here.curve(chord)) {
             Some(curve) => curves.push(curve),
             None => return Ok(None),
         }
@@ -44,7 +47,7 @@ pub fn carry(
     let dual = match QuadLayout::dual(&there, &[], layout.euler()) {
         Ok(dual) if found == wanted => dual,
         other => {
-            tracing::debug!(wanted, found, error = ?other.err(), "curves do not cross on the other mesh as here");
+            tracing::debug!(wanted, found, error = ?other.err(), "curves cross differently on the other mesh");
             return Ok(None);
         }
     };
@@ -52,32 +55,32 @@ pub fn carry(
     for (segment, arc) in there.segments.iter().zip(&dual.arcs) {
         chords[segment.curve as usize] = arc.chord;
     }
-    // Patches lie where curves cross.
-    let center = |p: usize| {
+    // Patches are matched by the distance of their centres from crossings.
+    let centre = |p: usize| {
         let sides = layout.patches[p].sides;
-        sides.map(|(arc, _)| here.drawing.mesh.positions[here.middles[arc as usize] as usize]).iter().sum::<DVec3>()
+        sides.map(|(arc, _)| here.embedding.mesh.positions[here.middles[arc as usize] as usize]).iter().sum::<DVec3>()
             / 4.0
     };
     let crossing = |q: usize| there.refined.positions[there.crossings[q].vertex as usize];
-    let Some(same) = matching(layout, &dual, &chords, |p, q| center(p).distance(crossing(q))) else {
-        tracing::debug!("curves do not cross on the other mesh in the same order");
+    let Some(same) = isomorphism(layout, &dual, &chords, |p, q| centre(p).distance(crossing(q))) else {
+        tracing::debug!("curves cross in another order on the other mesh");
         return Ok(None);
     };
     let mut preferred = vec![None; dual.nodes.len()];
     for (n, &other) in same.nodes.iter().enumerate() {
-        preferred[other as usize] = place(n);
+        preferred[other as usize] = position(n);
     }
-    Ok(Some(renumbered(embed(&there, &dual, &preferred, progress)?, &same)))
+    Ok(Some(renumbered(initial_embedding(&there, &dual, &preferred, progress)?, &same)))
 }
 
-/// A drawing with the numbers that its parts have in the layout that was matched to the one drawn.
-fn renumbered(drawing: Embedding, same: &Matching) -> Embedding {
-    let Embedding { mut mesh, base_face, nodes, arcs, arc_parameters, seeds } = drawing;
+/// An embedding of a layout, renumbered to that of an isomorphic layout.
+fn renumbered(embedding: Embedding, same: &Isomorphism) -> Embedding {
+    let Embedding { mut mesh, base_face, nodes, arcs, arc_parameters, seeds } = embedding;
     let mut number = vec![0; arcs.len()];
     for (a, &(b, _)) in (0..).zip(&same.arcs) {
         number[b as usize] = a;
     }
-    // A mark is that of both half-edges.
+    // Both half-edges of an edge share a mark.
     let first = |mesh: &RefinedMesh, h: u32| mesh.twin(h).is_none_or(|t| h < t);
     for h in 0..3 * mesh.n_faces() as u32 {
         if let Mark::Arc(b) = mesh.mark(h)

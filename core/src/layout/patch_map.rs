@@ -1,41 +1,28 @@
-//! Maps of all patches to rectangles.
+//! Maps of patches to rectangles.
 //!
-//! Every patch is cut out along its arcs and mapped with little stretch, its four sides to the sides of a rectangle
-//! by arc length. The width of a rectangle is the mean length of the arcs of its chord, so that opposite
-//! sides, and with them all patches of a dual strip, agree.
-
-use std::collections::HashMap;
+//! Every patch is cut out along its arcs and mapped with little stretch. Its four sides are mapped to the sides of a
+//! rectangle by arc length. Width and height of the rectangle are the mean lengths of the arcs of its two chords, so
+//! that all patches along a chord have the same width.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::disc;
-use super::initial_embedding::{Embedding, lengths};
-use super::piece::Submesh;
+use super::disc_map::{InitialWeights, count_flipped, disc_map};
+use super::embedding::{Embedding, path_lengths};
+use super::patch_disc::{ArcLookup, PatchDisc, PatchShapeError};
 use super::structure::QuadLayout;
-use crate::dual::{Mark, RefinedMesh};
-use crate::mesh::{HalfedgeId, TriMesh, TriMeshError, VertexId};
+use crate::dual::RefinedMesh;
+use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::SolveError;
 
 /// Why patches could not be mapped.
 #[derive(Debug, Error)]
 pub enum PatchError {
-    /// A patch is no disc with the four sides that the layout says.
-    #[error("patch {patch} has not the four sides of the layout")]
-    Sides {
-        /// The patch.
-        patch: usize,
-    },
-    /// A patch is no disc.
-    #[error("patch {patch} is not a disc: {source}")]
-    NoDisc {
-        /// The patch.
-        patch: usize,
-        /// What the mesh kernel says.
-        source: TriMeshError,
-    },
+    /// A patch is not a disc with the four sides of the layout.
+    #[error(transparent)]
+    Shape(#[from] PatchShapeError),
     /// The linear system of a patch could not be solved.
     #[error("patch {patch}: {source}")]
     Solve {
@@ -44,7 +31,7 @@ pub enum PatchError {
         /// What the solver says.
         source: SolveError,
     },
-    /// Stopped from outside.
+    /// Cancelled from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -54,7 +41,7 @@ pub enum PatchError {
 pub struct PatchMap {
     /// The patch as a mesh of its own.
     pub mesh: TriMesh,
-    /// Vertex of the embedding that each of the first vertices is; the others lie inside the patch.
+    /// Vertex of the embedding for each of the first vertices; the others lie inside the patch.
     pub whole: Vec<u32>,
     /// Triangle of the original mesh that each face lies in.
     pub base_face: Vec<u32>,
@@ -62,11 +49,11 @@ pub struct PatchMap {
     pub uv: Vec<DVec2>,
     /// Size of the rectangle.
     pub size: DVec2,
-    /// Number of triangles that the map turns over.
+    /// Number of triangles that the map flips.
     pub flipped: usize,
 }
 
-/// Maps every patch of `layout`, embedded as `embedding`.
+/// Maps every patch of `layout`, embedded as `embedding`, to a rectangle.
 ///
 /// # Errors
 ///
@@ -98,30 +85,6 @@ pub fn map_patches(
         .collect()
 }
 
-/// Where arcs and nodes are.
-pub(crate) struct ArcLookup {
-    /// Arc of each directed edge on an arc, and whether it runs forward.
-    arc: HashMap<(u32, u32), (u32, bool)>,
-    is_node: Vec<bool>,
-}
-
-impl ArcLookup {
-    pub(crate) fn new(embedding: &Embedding) -> Self {
-        let mut arc = HashMap::new();
-        for (a, path) in embedding.arcs.iter().enumerate() {
-            for w in path.windows(2) {
-                arc.insert((w[0], w[1]), (a as u32, true));
-                arc.insert((w[1], w[0]), (a as u32, false));
-            }
-        }
-        let mut is_node = vec![false; embedding.mesh.n_vertices()];
-        for &v in &embedding.nodes {
-            is_node[v as usize] = true;
-        }
-        Self { arc, is_node }
-    }
-}
-
 fn map_patch(
     layout: &QuadLayout,
     embedding: &Embedding,
@@ -129,81 +92,24 @@ fn map_patch(
     p: usize,
     size: DVec2,
 ) -> Result<PatchMap, PatchError> {
-    let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
-    let faces = patch_faces(&embedding.mesh, embedding.seeds[p], on_arc);
-    let piece =
-        Submesh::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| PatchError::NoDisc { patch: p, source })?;
-    let sides = patch_sides(layout, lookup, &piece, p).ok_or(PatchError::Sides { patch: p })?;
-
-    let mut refined = RefinedMesh::new(&piece.mesh);
+    let PatchDisc { submesh, faces, sides } = PatchDisc::cut_out(layout, embedding, lookup, p)?;
+    let mut refined = RefinedMesh::new(&submesh.mesh);
     free_the_sides(&mut refined, &sides);
-    let mesh = refined.to_mesh().map_err(|source| PatchError::NoDisc { patch: p, source })?;
+    let mesh = refined.to_mesh().map_err(|source| PatchShapeError::NoDisc { patch: p, source })?;
     if mesh.euler_characteristic() != 1 {
-        return Err(PatchError::Sides { patch: p });
+        return Err(PatchShapeError::Sides { patch: p }.into());
     }
     let fixed = rectangle_border(&mesh, &sides, size);
     let solve_error = |source| PatchError::Solve { patch: p, source };
-    let uv = disc::relaxed(&mesh, &fixed, disc::First::Conformal).map_err(solve_error)?;
-    let flipped = disc::flipped(&mesh, &uv);
+    let uv = disc_map(&mesh, &fixed, InitialWeights::Cotangent).map_err(solve_error)?;
+    let flipped = count_flipped(&mesh, &uv);
     let base_face = (0..refined.n_faces() as u32)
         .map(|f| embedding.base_face[faces[refined.base_face(f) as usize] as usize])
         .collect();
-    Ok(PatchMap { mesh, whole: piece.whole, base_face, uv, size, flipped })
+    Ok(PatchMap { mesh, whole: submesh.whole, base_face, uv, size, flipped })
 }
 
-/// The faces reached from `seed` without passing an arc, in increasing order.
-pub(crate) fn patch_faces(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
-    let mut seen = std::collections::HashSet::from([seed]);
-    let mut faces = vec![seed];
-    let mut i = 0;
-    while i < faces.len() {
-        for h in 3 * faces[i]..3 * faces[i] + 3 {
-            if let Some(t) = mesh.twin(h).filter(|_| !on_arc(h))
-                && seen.insert(t / 3)
-            {
-                faces.push(t / 3);
-            }
-        }
-        i += 1;
-    }
-    faces.sort_unstable();
-    faces
-}
-
-/// The vertices of the four sides, in the order of the layout's patch, each from corner to corner.
-pub(crate) fn patch_sides(layout: &QuadLayout, lookup: &ArcLookup, piece: &Submesh, p: usize) -> Option<[Vec<u32>; 4]> {
-    let mesh = &piece.mesh;
-    let start = mesh.halfedges().find(|&h| mesh.twin(h).is_none())?;
-    let mut cycle = vec![start];
-    let mut h = start;
-    loop {
-        // The next border half-edge leaves the target and is the first of its fan.
-        h = mesh.vertex_halfedge(mesh.target(h));
-        if h == start || cycle.len() > mesh.n_halfedges() {
-            break;
-        }
-        cycle.push(h);
-    }
-    let whole = |v: VertexId| piece.whole[v.index()];
-    let n = cycle.len();
-    let corners: Vec<usize> = (0..n).filter(|&i| lookup.is_node[whole(mesh.origin(cycle[i])) as usize]).collect();
-    if corners.len() != 4 {
-        return None;
-    }
-    let side = |k: usize| -> Option<((u32, bool), Vec<u32>)> {
-        let (from, to) = (corners[k], if k == 3 { corners[0] + n } else { corners[k + 1] });
-        let mut list: Vec<u32> = (from..to).map(|i| mesh.origin(cycle[i % n]).0).collect();
-        let first: HalfedgeId = cycle[from];
-        let arc = lookup.arc.get(&(whole(mesh.origin(first)), whole(mesh.target(first))))?;
-        list.push(mesh.origin(cycle[to % n]).0);
-        Some((*arc, list))
-    };
-    let found: Vec<((u32, bool), Vec<u32>)> = (0..4).map(side).collect::<Option<_>>()?;
-    let turn = (0..4).find(|t| (0..4).all(|i| found[(i + t) % 4].0 == layout.patches[p].sides[i]))?;
-    Some([0, 1, 2, 3].map(|i| found[(i + turn) % 4].1.clone()))
-}
-
-/// Splits inner edges that join two vertices of one side: a straight side would flatten their triangles.
+/// Splits inner edges that join two vertices of one side. On a straight side their triangles would be degenerate.
 fn free_the_sides(mesh: &mut RefinedMesh, sides: &[Vec<u32>; 4]) {
     let mut on_side = vec![0u8; mesh.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
@@ -223,11 +129,12 @@ fn free_the_sides(mesh: &mut RefinedMesh, sides: &[Vec<u32>; 4]) {
     }
 }
 
+/// The positions of border vertices on the rectangle; `None` for inner vertices.
 fn rectangle_border(mesh: &TriMesh, sides: &[Vec<u32>; 4], size: DVec2) -> Vec<Option<DVec2>> {
     let corner = [DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
     let mut fixed = vec![None; mesh.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
-        let along = lengths(mesh.positions(), side);
+        let along = path_lengths(mesh.positions(), side);
         let total = along[along.len() - 1];
         for (&v, s) in side.iter().zip(along).take(side.len() - 1) {
             fixed[v as usize] = Some(corner[k].lerp(corner[(k + 1) % 4], s / total));
@@ -237,10 +144,10 @@ fn rectangle_border(mesh: &TriMesh, sides: &[Vec<u32>; 4], size: DVec2) -> Vec<O
 }
 
 impl PatchMap {
-    /// Barycentric coordinates in the map: the points of the surface that are mapped to `points`, each with
-    /// the triangle of the original mesh it lies in.
+    /// The points of the surface that are mapped to `points`, each with its triangle of the original mesh.
     ///
-    /// Every point of the rectangle is found; one that rounding puts between triangles goes to the nearest.
+    /// Every point of the rectangle is found. A point that rounding errors place between triangles is assigned to the
+    /// nearest.
     pub fn locate(&self, points: &[DVec2]) -> Vec<(DVec3, u32)> {
         let mut best: Vec<(f64, DVec3, u32)> = vec![(f64::NEG_INFINITY, DVec3::ZERO, 0); points.len()];
         let buckets = Buckets::new(points, self.size);
@@ -267,7 +174,7 @@ impl PatchMap {
     }
 }
 
-/// Points of a rectangle by cells of a regular grid.
+/// Points of a rectangle, sorted into the cells of a regular grid.
 struct Buckets {
     cells: Vec<Vec<usize>>,
     n: usize,

@@ -1,10 +1,10 @@
-//! Maps that fold, and what becomes of them.
+//! Removal of flipped triangles from maps of grids and fans.
 
 use glam::DVec2;
 
-use super::stiffen::assemble;
+use super::stiffening::assemble;
 use super::*;
-use crate::solve::{Constraint, SpdFactor, eliminate};
+use crate::solve::{Constraint, Reduction, SpdFactor, eliminate};
 
 /// A surface with a map.
 pub(super) struct Sheet {
@@ -72,7 +72,7 @@ fn pinned(n: u32, pins: &[(u32, DVec2)]) -> Sheet {
     Sheet { triangles: grid_triangles(n), reduction: eliminate(&variables, &constraints).unwrap(), quarters }
 }
 
-/// A grid with a vertex of its middle dragged over its neighbours, the boundary kept.
+/// A grid with a vertex in its middle dragged over its neighbours and a fixed boundary.
 pub(super) fn dragged(n: u32) -> Sheet {
     let mut pins = boundary(n);
     let v = at(n, n / 2, n / 2);
@@ -87,9 +87,9 @@ fn boundary(n: u32) -> Vec<(u32, DVec2)> {
         .collect()
 }
 
-/// A disc of `rings` rings of triangles around vertex 0, `sectors` in the first, whose angle in the map is
-/// `quarters` quarter turns. Charts are those of the sectors, each turned a quarter against the one before; what the
-/// quarters lack to the sectors is cut at the first ray.
+/// A disc of `rings` rings of triangles around vertex 0, with `sectors` triangles in the first ring. The angle of
+/// vertex 0 in the map is `quarters` quarter turns. Each sector has its own chart; neighbouring charts differ by
+/// quarter turns.
 fn fan(sectors: u32, quarters: u32, rings: u32, pins: &[(u32, u32, u32, DVec2)]) -> Sheet {
     let angle = std::f64::consts::TAU / f64::from(sectors);
     // Vertex (ring, sector, step) lies on the side of the ring from one ray to the next.
@@ -147,8 +147,9 @@ fn fan(sectors: u32, quarters: u32, rings: u32, pins: &[(u32, u32, u32, DVec2)])
     Sheet { triangles, reduction: eliminate(&variables, &constraints).unwrap(), quarters }
 }
 
-/// A grid with two neighbours in the middle, each tied to two vertices far off that draw it over the other.
-fn related(n: u32) -> Sheet {
+/// A grid with two neighbouring vertices in the middle, each constrained to two distant vertices that draw it over the
+/// other.
+fn constrained(n: u32) -> Sheet {
     let mut constraints: Vec<_> = boundary(n).iter().flat_map(|&(v, to)| fix(v, to)).collect();
     let mut tie =
         |a: u32, b: u32, rhs: f64| constraints.push(Constraint { terms: vec![(2 * a, 1.0), (2 * b, -1.0)], rhs });
@@ -162,29 +163,29 @@ fn related(n: u32) -> Sheet {
     Sheet { triangles: grid_triangles(n), reduction: eliminate(&variables, &constraints).unwrap(), quarters }
 }
 
-fn removed(sheet: &Sheet) -> (Vec<f64>, Unfolded) {
+fn removed(sheet: &Sheet) -> (Vec<f64>, FlipRemoval) {
     let y = solved(&sheet.problem());
-    let out = unfold(&sheet.problem(), &y, Effort::Thorough, &Progress::new()).unwrap();
-    assert_eq!(out.folds.len(), sheet.problem().folded(&sheet.reduction.expand(&out.y)).len());
+    let out = remove_flips(&sheet.problem(), &y, Effort::Thorough, &Progress::new()).unwrap();
+    assert_eq!(out.folds.len(), sheet.problem().flipped(&sheet.reduction.expand(&out.y)).len());
     (y, out)
 }
 
 #[test]
-fn a_dragged_vertex_leaves_no_fold() {
+fn dragged_vertex_leaves_no_flipped_triangle() {
     let (_, out) = removed(&dragged(24));
     assert!(out.folds_before > 0 && out.folds.is_empty());
     assert!(out.energy > out.energy_before && out.energy < 3.0 * out.energy_before);
 }
 
 #[test]
-fn nothing_to_do_changes_no_bit() {
+fn map_without_flips_is_returned_unchanged() {
     let sheet = pinned(6, &[(at(6, 3, 3), DVec2::new(3.2, 3.1))]);
     let (y, out) = removed(&sheet);
     assert_eq!((out.y, out.folds_before), (y, 0));
 }
 
 #[test]
-fn swapped_vertices_are_reported() {
+fn swapped_vertices_are_reported_as_not_resolved() {
     let n = 10;
     let pins = [(at(n, 5, 5), DVec2::new(6.0, 5.0)), (at(n, 6, 5), DVec2::new(5.0, 5.0))];
     let (_, out) = removed(&pinned(n, &pins));
@@ -193,7 +194,7 @@ fn swapped_vertices_are_reported() {
 }
 
 #[test]
-fn folds_beside_unresolvable_ones_go() {
+fn flips_beside_unresolvable_ones_are_removed() {
     let n = 30;
     let mut pins = boundary(n);
     pins.extend([(at(n, 15, 15), DVec2::new(16.0, 15.0)), (at(n, 16, 15), DVec2::new(15.0, 15.0))]);
@@ -211,7 +212,7 @@ fn folds_beside_unresolvable_ones_go() {
 }
 
 #[test]
-fn a_triangle_without_choice_is_told() {
+fn triangle_determined_by_constraints_is_reported_as_fixed() {
     let n = 8;
     let pins = [(4, 4, 4.0, 4.0), (5, 4, 4.0, 5.0), (5, 5, 5.0, 4.0)];
     let (_, out) = removed(&pinned(n, &pins.map(|(i, j, x, y)| (at(n, i, j), DVec2::new(x, y)))));
@@ -220,15 +221,15 @@ fn a_triangle_without_choice_is_told() {
 }
 
 #[test]
-fn related_vertices_move_together() {
-    let sheet = related(30);
+fn constrained_vertices_move_together() {
+    let sheet = constrained(30);
     let (_, out) = removed(&sheet);
     assert!(out.folds_before > 0 && out.folds.is_empty());
     assert!(out.energy < 2.0 * out.energy_before);
 }
 
 #[test]
-fn folds_go_across_seams_of_quarter_turns() {
+fn flips_are_removed_across_seams_with_quarter_turns() {
     // On the ray between two sectors of a vertex of valence 5.
     let pin = 4.0 * DVec2::from_angle(0.5) + DVec2::new(4.0, -4.0);
     let sheet = fan(6, 5, 8, &[(4, 2, 4, pin)]);
@@ -246,12 +247,12 @@ fn folds_go_across_seams_of_quarter_turns() {
 }
 
 #[test]
-fn a_vertex_of_too_high_valence_is_named() {
+fn vertex_of_too_high_valence_is_reported() {
     let reason = FlipReason::HighValence { vertex: 0, quarters: 12, triangles: 6 };
     let (_, out) = removed(&fan(6, 12, 6, &[]));
     assert_eq!(out.folds.len(), 6);
     assert!(out.folds.iter().all(|f| f.reason == reason));
-    // Folds elsewhere go all the same, and eleven quarters can be spanned.
+    // Flipped triangles elsewhere are removed, and six triangles can span eleven quarter turns.
     let pins = [(4, 0, 2, DVec2::new(7.5, 1.0))];
     let (_, out) = removed(&fan(6, 12, 6, &pins));
     assert!(out.folds_before > out.folds.len() && out.folds.iter().all(|f| f.reason == reason), "{out:?}");
@@ -259,12 +260,12 @@ fn a_vertex_of_too_high_valence_is_named() {
 }
 
 #[test]
-fn work_can_be_cancelled_and_nonsense_comes_back() {
+fn removal_can_be_cancelled_and_returns_nan_unchanged() {
     let sheet = dragged(12);
     let progress = Progress::new();
     let nonsense = vec![f64::NAN; sheet.reduction.n_free()];
-    let out = unfold(&sheet.problem(), &nonsense, Effort::Thorough, &progress).unwrap();
+    let out = remove_flips(&sheet.problem(), &nonsense, Effort::Thorough, &progress).unwrap();
     assert!(!out.folds.is_empty() && out.y.iter().all(|y| y.is_nan()));
     progress.cancel();
-    assert_eq!(unfold(&sheet.problem(), &solved(&sheet.problem()), Effort::Thorough, &progress), Err(Cancelled));
+    assert_eq!(remove_flips(&sheet.problem(), &solved(&sheet.problem()), Effort::Thorough, &progress), Err(Cancelled));
 }

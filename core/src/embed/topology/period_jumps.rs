@@ -20,7 +20,7 @@ use crate::solve::{SparseHermitian, SpdFactor, c64};
 use crate::surface::Metric;
 
 /// Penalty weight of an arc's direction in a triangle that the arc passes through, beside edge weights of about 2: the
-/// field follows the arcs, but may cut their corners. Chosen by hand.
+/// field follows the arcs, but may cut their corners.
 const ARC_PENALTY: f64 = 10.0;
 /// Diagonal term that keeps the system positive definite on a component without arcs; far below the edge weights.
 const REGULARISATION: f64 = 1e-7;

@@ -19,7 +19,7 @@ use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
 
-/// Rings of triangles around an irregular node that are split 1-to-4. Chosen by hand.
+/// Rings of triangles around an irregular node that are split 1-to-4.
 const RINGS: usize = 2;
 /// Triangles that a node needs for each quarter turn of the map around it: 30° of the map each.
 const TRIANGLES_PER_QUARTER: usize = 3;

@@ -18,7 +18,7 @@ use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 
 /// How far the isoline of an arc may end from where it should to be shown in a preview, relative to the arc's length.
-/// Chosen by hand.
+///
 const PREVIEW_TOLERANCE: f64 = 1e-3;
 
 /// What to do where an arc meets a triangle that the map flips.

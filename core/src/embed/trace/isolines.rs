@@ -11,10 +11,10 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// Distance from its end, as a fraction of an edge, below which a crossing is replaced by the vertex: it would leave a
-/// sliver. Chosen by hand.
+/// sliver.
 const SNAP: f64 = 1e-4;
 /// Distance from a line below which a point counts as on it, as a fraction of the square root of the map's area: the
-/// rounding errors of the map. Chosen by hand.
+/// rounding errors of the map.
 const ROUNDING: f64 = 1e-9;
 /// The largest fraction of an edge that may count as rounding: in a triangle smaller than the rounding errors of the
 /// map, a crossing in the middle of an edge still is one.

@@ -16,4 +16,6 @@ mod traced_layout;
 #[cfg(test)]
 mod samples;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;

@@ -17,7 +17,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, turn};
 
 /// Distance on an edge, as a fraction of it, below which the points of two crossing arcs are merged into one vertex, in
-/// which they meet: the triangles between them would be slivers. Chosen by hand.
+/// which they meet: the triangles between them would be slivers.
 const MERGE_DISTANCE: f64 = 1e-4;
 
 /// A mesh refined along arcs.

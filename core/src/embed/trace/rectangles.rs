@@ -18,7 +18,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, TriMeshError};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
 
-/// Largest deviation from a rectangle that counts as rounding, relative to half its circumference. Chosen by hand.
+/// Largest deviation from a rectangle that counts as rounding, relative to half its circumference.
 const ROUNDING: f64 = 1e-9;
 
 /// Why the patches of a traced layout are not rectangles.

@@ -12,7 +12,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// Largest relative difference between the length of an isoline and that of its arc's chain which counts as rounding.
-/// Chosen by hand.
+///
 pub(super) const LENGTH_TOLERANCE: f64 = 1e-6;
 /// Largest number of rounds in which nodes are rotated to fit their neighbours. Agreement spreads from nodes with a
 /// unique best rotation, mostly in one round.

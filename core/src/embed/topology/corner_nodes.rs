@@ -5,14 +5,12 @@
 //! nearest irregular node of that valence is moved to the corner along edges, nearest pairs first. A corner without a
 //! node near enough stays without one.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::mesh::{HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{Dijkstra, HalfedgeId, TriMesh, VertexId};
 
 /// Distance along edges below which a node is moved to a corner, as a fraction of the bounding-box diagonal: farther
 /// nodes belong to other parts of the surface.
@@ -31,11 +29,11 @@ pub(in crate::embed) fn move_nodes_to_corners(
     let corners = corners(&topology.mesh, sharp);
     let mut pairs: Vec<(f64, usize, VertexId)> = Vec::new();
     for &(corner, valence) in &corners {
-        let distance = distances(&topology.mesh, corner, |_| true);
+        let search = paths_to(&topology.mesh, corner, |_| true);
         for (i, n) in topology.nodes.iter().enumerate() {
-            let d = distance[n.vertex.index()];
-            if n.valence == valence && !n.boundary && !n.is_regular() && !pinned(i) && d.0 < REACH {
-                pairs.push((d.0, i, corner));
+            let distance = search.distance(n.vertex);
+            if n.valence == valence && !n.boundary && !n.is_regular() && !pinned(i) && distance < REACH {
+                pairs.push((distance, i, corner));
             }
         }
     }
@@ -48,12 +46,12 @@ pub(in crate::embed) fn move_nodes_to_corners(
         if placed[node] || taken(topology, corner) {
             continue;
         }
-        let towards = distances(&topology.mesh, corner, |v| {
+        let towards = paths_to(&topology.mesh, corner, |v| {
             v == topology.nodes[node].vertex || !(taken(topology, v) || topology.mesh.is_boundary_vertex(v))
         });
         let mut path = Vec::new();
         let mut at = topology.nodes[node].vertex;
-        while let Some(h) = towards[at.index()].1 {
+        while let Some(h) = towards.via(at) {
             path.push(h);
             at = topology.mesh.target(h);
         }
@@ -81,25 +79,21 @@ fn corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<(VertexId, usize)> {
         .collect()
 }
 
-/// For each vertex its distance along edges from `from` through vertices that are `open`, and the half-edge from it
-/// towards `from`, by Dijkstra's algorithm up to [`REACH`].
-fn distances(mesh: &TriMesh, from: VertexId, open: impl Fn(VertexId) -> bool) -> Vec<(f64, Option<HalfedgeId>)> {
-    let mut best = vec![(f64::INFINITY, None); mesh.n_vertices()];
-    best[from.index()].0 = 0.0;
-    let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
-    while let Some(Reverse((bits, v))) = queue.pop() {
-        let d = f64::from_bits(bits);
-        if d > best[v.index()].0 || d > REACH {
-            continue;
+/// The shortest edge paths to `corner` from vertices within [`REACH`], through vertices that are `open`: each vertex is
+/// reached by its half-edge towards the corner.
+fn paths_to(mesh: &TriMesh, corner: VertexId, open: impl Fn(VertexId) -> bool) -> Dijkstra<VertexId, HalfedgeId> {
+    let mut search = Dijkstra::new(mesh.n_vertices());
+    search.start(corner, 0.0);
+    while let Some((v, distance)) = search.settle() {
+        if distance > REACH {
+            break;
         }
         for h in mesh.outgoing(v) {
             let (Some(back), w) = (mesh.twin(h), mesh.target(h)) else { continue };
-            let far = d + mesh.vector(h).length();
-            if open(w) && far < best[w.index()].0 {
-                best[w.index()] = (far, Some(back));
-                queue.push(Reverse((far.to_bits(), w)));
+            if open(w) {
+                search.reach(w, distance + mesh.vector(h).length(), back);
             }
         }
     }
-    best
+    search
 }

@@ -9,7 +9,7 @@
 //! valence `k` is `−k/4`, and each arc keeps its direction. The turning numbers along generators and boundaries are
 //! sums of these jumps, so that they need not be computed one by one and zipped together.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 use crate::dual::{Mark, next};
 use crate::embed::EmbeddingError;
@@ -18,7 +18,7 @@ use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps, turns_a
 // Shared with the rooms that walk over triangles of a topology.
 pub(in crate::embed) use crate::embed::topology::period_jumps::jump_across;
 use crate::layout::{Embedding, QuadLayout};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
 
 /// A node of the layout as a vertex of the mesh.
@@ -182,21 +182,17 @@ impl Charts {
                 }
             }
         }
-        let mut charts = Self { frame: vec![i32::MIN; refined.n_faces()], arc_headings: arc_headings.to_vec(), along };
+        let mut charts = Self { frame: vec![0; refined.n_faces()], arc_headings: arc_headings.to_vec(), along };
         // The first face of each working triangle gives it its frame; the frames of its other faces follow by a flood.
+        let mut search = BreadthFirst::new(refined.n_faces());
         for seed in 0..refined.n_faces() as u32 {
-            if charts.frame[seed as usize] != i32::MIN {
-                continue;
-            }
-            charts.frame[seed as usize] = 0;
-            let mut queue = VecDeque::from([seed]);
-            while let Some(f) = queue.pop_front() {
+            search.start(seed);
+            while let Some(f) = search.visit() {
                 for h in 3 * f..3 * f + 3 {
                     let Some(t) = refined.twin(h) else { continue };
                     let g = t / 3;
-                    if refined.tag[g as usize] == refined.tag[f as usize] && charts.frame[g as usize] == i32::MIN {
+                    if refined.tag[g as usize] == refined.tag[f as usize] && search.reach(g, ()) {
                         charts.frame[g as usize] = charts.frame[f as usize] + charts.rotation(working, h, t);
-                        queue.push_back(g);
                     }
                 }
             }

@@ -9,13 +9,12 @@
 //! Zipping (Campen, section 6.3.1) solves the same problem from turning numbers along generators; here the jumps along
 //! the initial embedding already determine these.
 
-use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
 use crate::embed::EmbeddingError;
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::solve::{SparseHermitian, SpdFactor, c64};
 use crate::surface::Metric;
 
@@ -178,26 +177,14 @@ pub(super) fn fewest_edges(
     from: VertexId,
     is_target: impl Fn(VertexId) -> bool,
 ) -> Option<Vec<HalfedgeId>> {
-    let mut reached: Vec<Option<HalfedgeId>> = vec![None; mesh.n_vertices()];
-    let mut queue = VecDeque::from([from]);
-    while let Some(v) = queue.pop_front() {
+    let mut search = BreadthFirst::new(mesh.n_vertices());
+    search.start(from);
+    while let Some(v) = search.visit() {
         if v != from && is_target(v) {
-            let mut path = Vec::new();
-            let mut at = v;
-            while at != from {
-                let h = reached[at.index()]?;
-                path.push(h);
-                at = mesh.origin(h);
-            }
-            path.reverse();
-            return Some(path);
+            return search.path_to(v, |&h| mesh.origin(h));
         }
         for h in mesh.outgoing(v) {
-            let w = mesh.target(h);
-            if w != from && reached[w.index()].is_none() {
-                reached[w.index()] = Some(h);
-                queue.push_back(w);
-            }
+            search.reach(mesh.target(h), h);
         }
     }
     None

@@ -9,14 +9,12 @@
 //! has enough triangles. The surface does not change, nor does the embedding: chains lead through parts of the same
 //! triangles as before.
 
-use std::collections::VecDeque;
-
 use glam::DVec3;
 
 use crate::embed::EmbeddingError;
 use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc, node_indices};
 use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
 
 /// Rings of triangles around an irregular node that are split 1-to-4.
@@ -139,15 +137,8 @@ fn edges_near_nodes(topology: &EmbeddingTopology) -> Vec<bool> {
     for n in topology.nodes.iter().filter(|n| !n.is_regular()) {
         near[n.vertex.index()] = true;
     }
-    let mut inside = vec![false; mesh.n_faces()];
-    for _ in 0..RINGS {
-        for f in mesh.faces() {
-            inside[f.index()] |= mesh.face_vertices(f).iter().any(|v| near[v.index()]);
-        }
-        for f in mesh.faces().filter(|f| inside[f.index()]) {
-            mesh.face_vertices(f).iter().for_each(|v| near[v.index()] = true);
-        }
-    }
+    mesh.dilate_vertices(&mut near, RINGS - 1);
+    let inside = mesh.faces_at(&near);
     let mut marks = vec![false; mesh.n_edges()];
     for f in mesh.faces().filter(|f| inside[f.index()]) {
         mesh.face_halfedges(f).iter().for_each(|&h| marks[mesh.edge(h).index()] = true);
@@ -237,18 +228,14 @@ impl SplitMesh {
 
     /// The half-edges crossed from `from` to the nearest part of the same triangle that satisfies `is_target`.
     fn walk_inside(&self, from: FaceId, is_target: impl Fn(FaceId) -> bool) -> Option<Vec<HalfedgeId>> {
-        let mut ways = VecDeque::from([(from, Vec::new())]);
-        let mut seen = vec![from];
-        while let Some((f, way)) = ways.pop_front() {
+        let mut search = BreadthFirst::sparse();
+        search.start(from);
+        while let Some(f) = search.visit() {
             if is_target(f) {
-                return Some(way);
+                return search.path_to(f, |&h| self.mesh.face(h));
             }
-            for h in self.mesh.face_halfedges(f).into_iter().filter(|h| self.base_halfedge[h.index()].is_none()) {
-                let Some(g) = self.mesh.twin(h).map(|t| self.mesh.face(t)) else { continue };
-                if !seen.contains(&g) {
-                    seen.push(g);
-                    ways.push_back((g, way.iter().copied().chain([h]).collect()));
-                }
+            for (h, g) in self.mesh.adjacent_faces(f).filter(|(h, _)| self.base_halfedge[h.index()].is_none()) {
+                search.reach(g, h);
             }
         }
         None

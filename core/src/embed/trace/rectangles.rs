@@ -4,8 +4,6 @@
 //! sides are isolines; it is rotated and translated so that its first corner is the origin and its first side runs
 //! along +u. Neighbouring patches agree along their arc without scaling, as both take its length from the same map.
 
-use std::collections::VecDeque;
-
 use glam::DVec2;
 use rayon::prelude::*;
 use thiserror::Error;
@@ -14,7 +12,7 @@ use crate::dual::Mark;
 use crate::embed::trace::isolines::corner_uv;
 use crate::embed::trace::traced_layout::TracedLayout;
 use crate::layout::{ArcLookup, PatchMap, QuadLayout, Submesh, patch_faces, patch_sides};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, TriMeshError};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, TriMeshError};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
 
@@ -103,26 +101,24 @@ fn map_rectangle(
 /// coordinates of a vertex in different triangles. Face `k` of the patch is face `faces[k]` of the traced mesh.
 fn one_chart(traced: &TracedLayout, patch: &TriMesh, faces: &[u32]) -> (Vec<DVec2>, f64) {
     let whole = |h: HalfedgeId| HalfedgeId(3 * faces[h.index() / 3] + h.0 % 3);
-    let mut chart: Vec<Option<Transition>> = vec![None; faces.len()];
+    // The transition from the chart of each triangle to that of the first.
+    let mut to_first = vec![Transition::IDENTITY; faces.len()];
     let mut uv: Vec<Option<DVec2>> = vec![None; patch.n_vertices()];
     let mut gap = 0.0f64;
-    let mut queue = VecDeque::new();
-    chart[0] = Some(Transition::IDENTITY);
-    queue.push_back((0, Transition::IDENTITY));
-    while let Some((f, change)) = queue.pop_front() {
-        for h in patch.face_halfedges(FaceId::new(f)) {
+    let mut search = BreadthFirst::new(faces.len());
+    search.start(FaceId(0));
+    while let Some(f) = search.visit() {
+        let change = to_first[f.index()];
+        for h in patch.face_halfedges(f) {
             let w = whole(h);
             let at = change.apply(corner_uv(&traced.map, w));
             let known = *uv[patch.origin(h).index()].get_or_insert(at);
             gap = gap.max(known.distance(at));
-            let Some(t) = patch.twin(h) else { continue };
-            let g = t.index() / 3;
-            if chart[g].is_none()
+            if let Some(t) = patch.twin(h)
                 && let Some(back) = traced.map.transition(&traced.mesh, whole(t))
+                && search.reach(patch.face(t), ())
             {
-                let next = back.then(&change);
-                chart[g] = Some(next);
-                queue.push_back((g, next));
+                to_first[patch.face(t).index()] = back.then(&change);
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Sample meshes for the tests of this room, with exact seamless maps and layouts whose arcs are isolines of them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
 use crate::embed::trace::isolines::corner_uv;
 use crate::embed::trace::separatrix_matching::ArcChain;
 use crate::layout::{Arc, Node, Patch, QuadLayout};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{Dijkstra, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// Pseudo-random numbers from −1 to 1.
@@ -150,28 +150,15 @@ fn chain(mesh: &TriMesh, map: &SeamlessMap, from: VertexId, via: &[DVec3], to: V
 
 /// The half-edges crossed on the shortest chain from one triangle to another, measured between centroids.
 fn route(mesh: &TriMesh, from: usize, to: usize, middle: &impl Fn(usize) -> DVec3) -> Vec<HalfedgeId> {
-    let mut best = vec![(f64::INFINITY, None); mesh.n_faces()];
-    let mut open = BTreeSet::from([(0u64, from)]);
-    best[from].0 = 0.0;
-    while let Some((_, f)) = open.pop_first() {
-        for h in mesh.face_halfedges(FaceId::new(f)) {
-            let Some(t) = mesh.twin(h) else { continue };
-            let (g, d) = (t.index() / 3, best[f].0 + middle(f).distance(middle(t.index() / 3)));
-            if d < best[g].0 {
-                best[g] = (d, Some(h));
-                open.insert((d.to_bits(), g));
-            }
+    let (from, to) = (FaceId::new(from), FaceId::new(to));
+    let mut search = Dijkstra::new(mesh.n_faces());
+    search.start(from, 0.0);
+    while let Some((f, distance)) = search.settle() {
+        for (h, g) in mesh.adjacent_faces(f) {
+            search.reach(g, distance + middle(f.index()).distance(middle(g.index())), h);
         }
     }
-    let mut crossed = Vec::new();
-    let mut f = to;
-    while f != from {
-        let h = best[f].1.unwrap();
-        crossed.push(h);
-        f = h.index() / 3;
-    }
-    crossed.reverse();
-    crossed
+    search.path_to(to, |&h| mesh.face(h)).unwrap()
 }
 
 /// A vertex of a mesh at a point.

@@ -104,7 +104,7 @@ struct Inserter<'a> {
 }
 
 /// The mark of the new edges at a node until the parts of its triangle are tagged: no curve has this index.
-const SPOKE: Mark = Mark::Curve(u32::MAX);
+const NEW_EDGE: Mark = Mark::Curve(u32::MAX);
 
 impl Inserter<'_> {
     /// Makes vertex `x` of the refined mesh vertex `vertex` of the working mesh; `None` if that cannot be done.
@@ -160,9 +160,9 @@ impl Inserter<'_> {
                 .refined
                 .insert_path(
                     (x, self.refined_vertex[c as usize]),
-                    SPOKE,
+                    NEW_EDGE,
                     |m, face| m.tag[face as usize] == f,
-                    |mark| mark == SPOKE,
+                    |mark| mark == NEW_EDGE,
                     |m, v| plane.project(m.positions[v as usize]),
                 )
                 .ok()?;
@@ -192,9 +192,9 @@ impl Inserter<'_> {
     /// Inserts the vertices at which a new edge crosses arcs into the paths of these arcs.
     fn insert_crossings(&mut self, path: &[u32]) {
         for &x in &path[1..path.len() - 1] {
-            let spokes = self.refined.outgoing(x);
+            let outgoing = self.refined.outgoing(x);
             let mut beside: HashMap<u32, Vec<u32>> = HashMap::new();
-            for h in spokes {
+            for h in outgoing {
                 if let Mark::Arc(a) = self.refined.mark(h) {
                     beside.entry(a).or_default().push(self.refined.target(h));
                 }
@@ -221,7 +221,7 @@ impl Inserter<'_> {
         self.refined.tag[seed as usize / 3] = id;
         while let Some(face) = stack.pop() {
             for h in 3 * face..3 * face + 3 {
-                if self.refined.mark(h) == SPOKE {
+                if self.refined.mark(h) == NEW_EDGE {
                     continue;
                 }
                 if let Some(t) = self.refined.twin(h).filter(|&t| self.refined.tag[t as usize / 3] == f) {
@@ -247,7 +247,7 @@ impl Inserter<'_> {
             // The next half-edge on the border: around `v` from the face of `h` until `f` ends.
             let mut n = crate::dual::next(h);
             while let Some(t) = self.refined.twin(n).filter(|&t| self.refined.tag[t as usize / 3] == f) {
-                if self.refined.mark(n) == SPOKE {
+                if self.refined.mark(n) == NEW_EDGE {
                     return false;
                 }
                 n = crate::dual::next(t);
@@ -263,7 +263,7 @@ impl Inserter<'_> {
         while let Some(v) = stack.pop() {
             for h in self.refined.outgoing(v) {
                 for g in [h, crate::dual::prev(h)] {
-                    if self.refined.mark(g) == SPOKE {
+                    if self.refined.mark(g) == NEW_EDGE {
                         self.refined.set_mark(g, Mark::Free);
                         stack.extend([self.refined.origin(g), self.refined.target(g)]);
                     }

@@ -104,6 +104,7 @@ impl ThroughArcs {
         let mut list = vec![first];
         let mut at = first;
         while let Some(on) = self.opposite[at.0 as usize][usize::from(!at.1)] {
+            // The bound on the length only matters for inconsistent layouts, where a chain need not return to `first`.
             if on == first || list.len() > 2 * self.opposite.len() {
                 return (list, true);
             }

@@ -79,7 +79,7 @@ fn arcs_of_a_node_may_all_start_in_one_triangle() {
     for k in [3, 5, 6, 8] {
         let mut s = samples::cone(k, 4, 0.2);
         let centre = s.nodes[0];
-        // Every chain is led around the centre to begin in the same triangle, the same way around.
+        // Every chain is extended around the centre to start in the same triangle, always counter-clockwise.
         let first = s.mesh.vertex_halfedge(centre);
         for (chain, arc) in s.chains.iter_mut().zip(&s.layout.arcs) {
             if arc.nodes[0] != 0 {
@@ -260,8 +260,8 @@ fn beside(e: &CompletedLayout) -> Sample {
                 h = mesh.next(mesh.twin(h).unwrap());
             }
         }
-        let way = map.uv[start.index() / 3][(start.index() + 1) % 3] - map.uv[start.index() / 3][start.index() % 3];
-        let along = |k: u8| turn(way, -i32::from(k)).x;
+        let edge = map.uv[start.index() / 3][(start.index() + 1) % 3] - map.uv[start.index() / 3][start.index() % 3];
+        let along = |k: u8| turn(edge, -i32::from(k)).x;
         let heading = (0..4u8).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap();
         chains.push(samples::OwnedChain { start, crossed, end: mesh.next(h), heading });
     }

@@ -86,7 +86,7 @@ struct Segment {
     @location(1) start: vec3f,
     @location(2) end: vec3f,
     @location(3) after: vec3f,
-    @location(4) color: vec4f,
+    @location(4) colour: vec4f,
     // Width in points; how much of the colour hidden parts keep.
     @location(5) style: vec2f,
 }
@@ -97,7 +97,7 @@ struct LineVarying {
     @location(1) @interpolate(flat) start: vec3f,
     @location(2) @interpolate(flat) end: vec3f,
     @location(3) @interpolate(flat) neighbours: vec4f,
-    @location(4) @interpolate(flat) color: vec4f,
+    @location(4) @interpolate(flat) colour: vec4f,
     @location(5) @interpolate(flat) style: vec2f,
 }
 
@@ -132,7 +132,7 @@ fn line_vertex(in: Segment, @builtin(vertex_index) index: u32) -> LineVarying {
     out.start = vec3f(start, a.z / a.w);
     out.end = vec3f(end, b.z / b.w);
     out.neighbours = vec4f(to_pixel(p), to_pixel(n));
-    out.color = in.color;
+    out.colour = in.colour;
     out.style = in.style;
     return out;
 }
@@ -160,15 +160,15 @@ fn line_fragment(in: LineVarying) -> @location(0) vec4f {
     let cover = clamp(0.5 * in.style.x * view.toggles.w + 0.5 - here.y, 0.0, 1.0);
     let centre = mix(in.start, in.end, here.x);
     let seen = visible(centre.xy, centre.z);
-    let alpha = in.color.a * cover * mix(in.style.y, 1.0, seen);
-    return vec4f(in.color.rgb * alpha, alpha);
+    let alpha = in.colour.a * cover * mix(in.style.y, 1.0, seen);
+    return vec4f(in.colour.rgb * alpha, alpha);
 }
 
 // ---- markers ----
 
 struct Marker {
     @location(0) position: vec3f,
-    @location(1) color: vec4f,
+    @location(1) colour: vec4f,
     // Radius in points; how much of the colour hidden markers keep; 1 for a square with a pale core, else 0.
     @location(2) style: vec3f,
 }
@@ -177,7 +177,7 @@ struct MarkerVarying {
     @builtin(position) clip: vec4f,
     @location(0) offset: vec2f,
     @location(1) @interpolate(flat) centre: vec3f,
-    @location(2) @interpolate(flat) color: vec4f,
+    @location(2) @interpolate(flat) colour: vec4f,
     @location(3) @interpolate(flat) style: vec3f,
 }
 
@@ -194,7 +194,7 @@ fn marker_vertex(in: Marker, @builtin(vertex_index) index: u32) -> MarkerVarying
     out.offset = corner * reach;
     out.centre = vec3f(to_pixel(centre), centre.z / centre.w);
     out.clip = to_clip(out.centre.xy + out.offset);
-    out.color = in.color;
+    out.colour = in.colour;
     out.style = in.style;
     return out;
 }
@@ -209,7 +209,7 @@ fn marker_fragment(in: MarkerVarying) -> @location(0) vec4f {
     // A pale ring keeps the disc apart from the lines that meet in it.
     let inner = clamp(radius - 1.25 * view.toggles.w + 0.5 - distance, 0.0, 1.0);
     let core = select(0.0, clamp(0.34 * radius + 0.5 - round, 0.0, 1.0), square);
-    let rgb = mix(vec3f(1.0), in.color.rgb, inner * (1.0 - core));
-    let alpha = in.color.a * outer * mix(in.style.y, 1.0, visible(in.centre.xy, in.centre.z));
+    let rgb = mix(vec3f(1.0), in.colour.rgb, inner * (1.0 - core));
+    let alpha = in.colour.a * outer * mix(in.style.y, 1.0, visible(in.centre.xy, in.centre.z));
     return vec4f(rgb * alpha, alpha);
 }

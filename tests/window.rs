@@ -340,7 +340,7 @@ fn the_surface_takes_the_colours_that_are_chosen() {
     let plain = window.render().unwrap();
     window.get_by_role(egui::accesskit::Role::ComboBox).click();
     window.run_steps(4);
-    window.get_by_label("Alignment error").click();
+    window.get_by_role_and_label(egui::accesskit::Role::Button, "Alignment error").click();
     window.run_steps(6);
     assert_eq!(window.state().colour_mode(), ColourMode::Alignment);
     window.get_by_label_contains("Angle to the nearest principal");

@@ -7,7 +7,8 @@ pub fn improvement(i: &Improvement) -> String {
     if i.changes == 0 {
         return "no strips with a lower objective were found".into();
     }
-    let state = |f: &plait_core::weave::Fit| format!("{:.1}° with {}", f.alignment, count(f.patches, "patch", "patches"));
+    let state =
+        |f: &plait_core::weave::Fit| format!("{:.1}° with {}", f.alignment, count(f.patches, "patch", "patches"));
     format!(
         "alignment error {} (before: {}), objective {:.1} (before: {:.1})",
         state(&i.after),

@@ -193,5 +193,9 @@ fn segments(line: &Polyline) -> impl Iterator<Item = SegmentInstance> {
 }
 
 fn marker(m: &Marker) -> MarkerInstance {
-    MarkerInstance { position: m.position, colour: m.colour, style: [m.radius, m.hidden, f32::from(u8::from(m.square))] }
+    MarkerInstance {
+        position: m.position,
+        colour: m.colour,
+        style: [m.radius, m.hidden, f32::from(u8::from(m.square))],
+    }
 }

@@ -97,7 +97,9 @@ impl Problem {
             Self::Untouched => ("component has no strip", "components have no strip"),
             Self::NoCorner => ("region has no corner: strips must cross", "regions have no corner: strips must cross"),
             Self::Handles => ("region contains a handle", "regions contain handles"),
-            Self::Annulus => ("region is an annulus: a strip must cross it", "regions are annuli: strips must cross them"),
+            Self::Annulus => {
+                ("region is an annulus: a strip must cross it", "regions are annuli: strips must cross them")
+            }
             Self::Borders => ("region has several borders", "regions have several borders"),
             Self::BoundaryLoop => ("region contains a boundary loop", "regions contain boundary loops"),
             Self::BoundaryStretches => {
@@ -108,9 +110,7 @@ impl Problem {
             Self::SeveralCorners => {
                 ("region contains several corners of the shape", "regions contain several corners of the shape")
             }
-            Self::Valence => {
-                ("node valence does not match the curvature", "node valences do not match the curvature")
-            }
+            Self::Valence => ("node valence does not match the curvature", "node valences do not match the curvature"),
         };
         count(n, one, many)
     }

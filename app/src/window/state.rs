@@ -14,9 +14,7 @@ use super::messages::Messages;
 use super::prepared::Prepared;
 use crate::camera::Camera;
 use crate::distortion::ColourMode;
-use crate::engine::{
-    BuiltIn, Detail, EmbeddingStep, EmbeddingSummary, LayoutPart, LayoutPreview, Scene, StripId,
-};
+use crate::engine::{BuiltIn, Detail, EmbeddingStep, EmbeddingSummary, LayoutPart, LayoutPreview, Scene, StripId};
 use crate::input::Input;
 use crate::shading;
 use crate::worker::{Running, StoppableWork, Worker};

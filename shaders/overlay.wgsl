@@ -1,6 +1,6 @@
 // Composes the image of the surface with the backdrop, and draws lines and markers of constant width on the screen.
-// Lines and markers compare the depth at their centre line with that of the surface. So a wide line is visible or hidden
-// across its whole width, with a smooth transition.
+// Lines and markers compare the depth at their centre line with that of the surface. So a wide line is visible or
+// hidden across its whole width, with a smooth transition.
 
 struct View {
     clip_from_world: mat4x4f,

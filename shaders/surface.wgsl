@@ -58,8 +58,8 @@ fn view_direction(x: f32, y: f32, z: f32) -> vec3f {
     return normalize(x * view.view_axes[0].xyz + y * view.view_axes[1].xyz + z * view.view_axes[2].xyz);
 }
 
-// Coverage of a pixel by a strip (x) and by its lines (y). Lines of `width` pixels lie at integers of `coordinate`, both
-// ends of the strip included. Lines too dense for the screen fade to their mean.
+// Coverage of a pixel by a strip (x) and by its lines (y). Lines of `width` pixels lie at integers of `coordinate`,
+// both ends of the strip included. Lines too dense for the screen fade to their mean.
 fn stripes(coordinate: f32, reach: vec2f, width: f32) -> vec2f {
     let per_pixel = max(length(vec2f(dpdx(coordinate), dpdy(coordinate))), 1e-6);
     let to_end = min(reach.x - coordinate, coordinate + reach.y) / per_pixel;

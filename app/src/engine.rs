@@ -132,8 +132,8 @@ pub struct ExportReport {
 /// All errors are [`EngineError::Cancelled`], or a failure with its reason.
 #[allow(clippy::missing_errors_doc)] // said once, above
 pub trait Engine: Send {
-    /// The proposals through a point of [`Scene::design_mesh`], best first. `first` is called with a proposal found early,
-    /// before it is known to be the best.
+    /// The proposals through a point of [`Scene::design_mesh`], best first. `first` is called with a proposal found
+    /// early, before it is known to be the best.
     fn proposals(
         &mut self,
         at: SurfacePoint,
@@ -237,8 +237,8 @@ pub struct ModelFacts {
     pub repairs: Vec<String>,
 }
 
-/// The triangles to draw, a refinement of the design mesh. Arrays per face have one entry for each of `faces`. Arrays that
-/// do not depend on the strips are shared between scenes where possible.
+/// The triangles to draw, a refinement of the design mesh. Arrays per face have one entry for each of `faces`. Arrays
+/// that do not depend on the strips are shared between scenes where possible.
 #[derive(Debug, Clone, Default)]
 pub struct DisplaySurface {
     /// Positions.

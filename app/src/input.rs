@@ -1,8 +1,8 @@
 //! Translates pointer events over the 3D view to intents, by a state machine without a window.
 //!
-//! A left click places a strip, or pins a node or an arc. Left or middle drag orbits, right drag or Shift with middle drag
-//! pans. The wheel browses proposals over the surface, and zooms over the background or with Ctrl. Positions are in points
-//! from the top left corner of the view.
+//! A left click places a strip, or pins a node or an arc. Left or middle drag orbits, right drag or Shift with middle
+//! drag pans. The wheel browses proposals over the surface, and zooms over the background or with Ctrl. Positions are
+//! in points from the top left corner of the view.
 
 use glam::Vec2;
 

@@ -15,7 +15,8 @@ pub struct SegmentInstance {
     pub style: [f32; 2],
 }
 
-/// A marker as `overlay.wgsl` reads it, one instance each. `style`: radius in points, visibility when hidden, 1 if square.
+/// A marker as `overlay.wgsl` reads it, one instance each. `style`: radius in points, visibility when hidden, 1 if
+/// square.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct MarkerInstance {

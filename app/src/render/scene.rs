@@ -98,8 +98,8 @@ pub struct ViewUniforms {
 }
 
 impl ViewUniforms {
-    /// A perspective view. `clip_from_view` maps depth to 0 (near) .. 1 (far); `view_from_world` is rigid; `near` and `far`
-    /// are the distances of the clipping planes. The renderer fills in size and toggles.
+    /// A perspective view. `clip_from_view` maps depth to 0 (near) .. 1 (far); `view_from_world` is rigid; `near` and
+    /// `far` are the distances of the clipping planes. The renderer fills in size and toggles.
     pub fn new(clip_from_view: Mat4, view_from_world: Mat4, near: f32, far: f32) -> Self {
         let world_from_view = view_from_world.inverse();
         let axis = |i: usize| world_from_view.col(i).to_array();

@@ -39,7 +39,8 @@ impl InitialPreview {
         let (nodes, arcs) = embedding_polylines(&layout.embedding);
         let model = session.model();
         let on_surface = |p| model.index.nearest(p).position(&model.loaded.mesh);
-        // Inner arcs have kinks where they cross strips, and are smoothed for display. Boundary arcs lie on the boundary.
+        // Inner arcs have kinks where they cross strips, and are smoothed for display. Boundary arcs lie on the
+        // boundary.
         let boundary = |i: usize| layout.layout.arcs[i].boundary;
         let arcs = arcs.into_iter().enumerate();
         let arcs = arcs.map(|(i, arc)| if boundary(i) { arc } else { smoothed_polyline(&arc, on_surface) });

@@ -1,8 +1,8 @@
 //! Display of a design whose strips are woven on a proxy.
 //!
-//! The barycentre of each triangle of the design mesh is mapped to the proxy. The triangle takes the region and the stripes
-//! of the refined face that contains this point. Borders of regions are therefore as fine as the triangles of the
-//! design mesh; these are smaller than those of the proxy.
+//! The barycentre of each triangle of the design mesh is mapped to the proxy. The triangle takes the region and the
+//! stripes of the refined face that contains this point. Borders of regions are therefore as fine as the triangles of
+//! the design mesh; these are smaller than those of the proxy.
 
 use std::sync::Arc;
 
@@ -62,8 +62,8 @@ impl ProxyDisplay {
     }
 }
 
-/// The stripes of a refined face, extended linearly to a triangle of the design mesh whose corners have these `images` on
-/// the proxy.
+/// The stripes of a refined face, extended linearly to a triangle of the design mesh whose corners have these `images`
+/// on the proxy.
 fn extended_stripes(
     map: &StripMap,
     refined: &RefinedMesh,

@@ -4,8 +4,8 @@ use plait_core::strip::{StripCoverage, StripMap};
 
 use crate::engine::Stripes;
 
-/// Distance of two lines, as a fraction of the bounding-box diagonal: dense enough for a texture, sparse enough to follow
-/// a line. Chosen by hand.
+/// Distance of two lines, as a fraction of the bounding-box diagonal: dense enough for a texture, sparse enough to
+/// follow a line. Chosen by hand.
 const SPACING: f64 = 0.012;
 /// Most lines on one side of a strip; the renderer stores their number in a byte.
 const MAX_LINES: f64 = 120.0;
@@ -27,7 +27,8 @@ pub(super) fn covering_strip(
     visible(strip.curve).then(|| (strip, map.stripe[f][k].map(f64::from)))
 }
 
-/// Stripe coordinates from distances to the spine. Each side of the strip is divided evenly, so that it ends with a line.
+/// Stripe coordinates from distances to the spine. Each side of the strip is divided evenly, so that it ends with a
+/// line.
 pub(super) fn stripes(strip: &StripCoverage, distance: [f64; 3]) -> Stripes {
     let lines = strip.bounds.map(|b| (b / SPACING).round().clamp(1.0, MAX_LINES));
     let side = |d: f64| usize::from(d < 0.0);

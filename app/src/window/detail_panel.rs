@@ -10,8 +10,8 @@ use crate::engine::{Detail, Scene};
 
 /// Range of the smoothing radius, in percent of the bounding-box diagonal. More leaves little of any shape.
 const SMOOTHING: std::ops::RangeInclusive<f64> = 0.0..=5.0;
-/// Range of the curvature radius, in percent of the bounding-box diagonal. With less, curvature is that of single triangles;
-/// more leaves little of any shape.
+/// Range of the curvature radius, in percent of the bounding-box diagonal. With less, curvature is that of single
+/// triangles; more leaves little of any shape.
 const CURVATURE_RADIUS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
 /// Difference below which two values are equal, as a fraction of the bounding-box diagonal: less than a slider shows.
 const TOLERANCE: f64 = 1e-4;

@@ -9,11 +9,12 @@ use crate::engine::{LayoutPart, LayoutPreview};
 const NODE_RADIUS: f32 = 8.0;
 /// Pick radius of an arc, in points. It is smaller, since strips are placed between arcs.
 const ARC_RADIUS: f32 = 4.0;
-/// Depth behind the surface up to which a point counts as visible, as a fraction of the bounding-box diagonal. Nodes and arcs
-/// may lie a little below the triangles.
+/// Depth behind the surface up to which a point counts as visible, as a fraction of the bounding-box diagonal. Nodes
+/// and arcs may lie a little below the triangles.
 const DEPTH_TOLERANCE: f32 = 0.01;
 
-/// The visible node or arc nearest to `at` on the screen, nodes first. `None` while the layout is hidden or being optimised.
+/// The visible node or arc nearest to `at` on the screen, nodes first. `None` while the layout is hidden or being
+/// optimised.
 pub fn pick(app: &PlaitApp, at: Vec2) -> Option<LayoutPart> {
     let layout = app.layout().filter(|_| app.options.layout && app.step.is_none())?;
     if app.is_optimising() {

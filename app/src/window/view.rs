@@ -95,8 +95,8 @@ fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
     list
 }
 
-/// Drops the second of two equal notches in one frame. Virtual X servers (VNC, Xvfb) report the press and the release of
-/// one wheel click as a notch each. A real wheel that is turned so fast only loses speed.
+/// Drops the second of two equal notches in one frame. Virtual X servers (VNC, Xvfb) report the press and the release
+/// of one wheel click as a notch each. A real wheel that is turned so fast only loses speed.
 fn drop_doubled_notches(events: &mut Vec<PointerEvent>) {
     let mut last = None;
     events.retain(|&event| {

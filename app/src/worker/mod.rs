@@ -1,9 +1,9 @@
 //! The worker: a thread that owns the engine, so that the window never waits.
 //!
-//! Jobs that change the design are queued and done in order. Of hover requests only the latest counts: a newer one, or any
-//! job, cancels the one that runs. A search for better strips and an optimisation of the embedding send intermediate
-//! results and can be stopped; a job that changes the strips cancels them. Opening a model cancels everything. Every
-//! reply wakes the window.
+//! Jobs that change the design are queued and done in order. Of hover requests only the latest counts: a newer one, or
+//! any job, cancels the one that runs. A search for better strips and an optimisation of the embedding send
+//! intermediate results and can be stopped; a job that changes the strips cancels them. Opening a model cancels
+//! everything. Every reply wakes the window.
 
 mod messages;
 mod shared;
@@ -70,7 +70,8 @@ impl Worker {
         self.shared.wake.notify_one();
     }
 
-    /// Requests the proposals through a point, in place of any earlier such request. Returns the generation of the request.
+    /// Requests the proposals through a point, in place of any earlier such request. Returns the generation of the
+    /// request.
     pub fn hover(&self, at: SurfacePoint) -> u64 {
         let mut state = self.shared.lock();
         state.generation += 1;

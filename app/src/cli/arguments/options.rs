@@ -22,8 +22,8 @@ pub struct RefineArguments {
     /// Remove chords one by one while that makes the layout more regular and the embedding no worse.
     #[arg(long)]
     pub simplify: bool,
-    /// Collapse chords whose arcs are shorter in the map than LENGTH, in units of the mesh. Without LENGTH: shorter than
-    /// the edge of a quad.
+    /// Collapse chords whose arcs are shorter in the map than LENGTH, in units of the mesh. Without LENGTH: shorter
+    /// than the edge of a quad.
     #[arg(long, value_name = "LENGTH", num_args = 0..=1)]
     pub collapse: Option<Option<f64>>,
 }

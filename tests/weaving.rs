@@ -243,7 +243,7 @@ fn other_strips_are_tried_by_a_script_and_by_the_command_line_alike() {
     let script = torus_script(folder.path(), &format!("{MERIDIAN}, {EQUATOR}"));
     let output = plait(&["weave", text(&script), "--improve", "3", "--no-optimise", "--out", text(&asked)]);
     assert!(output.status.success(), "{}", errors(&output));
-    assert!(errors(&output).contains("the shape"), "{}", errors(&output));
+    assert!(errors(&output).contains("objective"), "{}", errors(&output));
     let [a, b] = [scripted, asked].map(|f| std::fs::read(f.join("design.plait")).unwrap());
     assert!(a == b, "the designs differ");
 }

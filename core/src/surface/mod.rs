@@ -3,6 +3,7 @@
 //! A curve is the list of mesh edges that it crosses ([`SurfaceCurve`]); [`relax`](fn@relax) smooths it within its
 //! homotopy class.
 
+mod barycentric;
 mod curvature;
 mod curve;
 mod funnel;
@@ -19,6 +20,7 @@ mod trace_geodesic;
 mod vertex_fan;
 mod vertex_path;
 
+pub use barycentric::{barycentric, barycentric_inside};
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
 pub use geodesic::geodesic_in;

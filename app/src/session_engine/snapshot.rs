@@ -1,48 +1,51 @@
-//! Snapshots of a session for the window.
+//! Makes the scenes that the window shows of a session.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::dual::RefinedMesh;
 use plait_core::mesh::{FaceId, TriMesh};
+use plait_core::surface::barycentric_inside;
 use plait_core::weave::Session;
 
-use super::cover::Cover;
-use super::{Later, stripes, words};
+use super::layout_state::LayoutState;
+use super::proxy_display::ProxyDisplay;
+use super::{remarks, stripes};
 use crate::engine::{Detail, DisplaySurface, ModelFacts, Scene, Strip, StripId};
 use crate::shading::corner_normals;
+use crate::texts::grouped;
 
-/// What stays the same while strips come and go.
-pub struct ModelSnapshot {
+/// The part of the scene that depends on the model alone.
+pub(super) struct ModelSnapshot {
     facts: Arc<ModelFacts>,
-    look: Look,
+    display: ModelDisplay,
 }
 
-/// How the mesh looks without strips.
-enum Look {
-    /// Normals at the corners of the faces of a mesh that is woven on itself.
-    Itself(Vec<[DVec3; 3]>),
-    /// A mesh that is woven on its proxy.
-    Covered(Cover),
+/// How the design mesh is displayed.
+enum ModelDisplay {
+    /// Strips are woven on the design mesh itself: the normals at the corners of its faces.
+    Direct(Vec<[DVec3; 3]>),
+    /// Strips are woven on a proxy.
+    Proxy(ProxyDisplay),
 }
 
 impl ModelSnapshot {
-    pub fn new(session: &Session) -> Self {
+    pub(super) fn new(session: &Session) -> Self {
         let model = session.model();
         let mesh = &model.loaded.mesh;
         let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
         let normals = corner_normals(mesh.positions(), &faces, model.options.sharp_dihedral);
-        let look = match model.proxy {
-            Some(_) => Look::Covered(Cover::new(model, faces, normals)),
-            None => Look::Itself(normals),
+        let display = match model.proxy {
+            Some(_) => ModelDisplay::Proxy(ProxyDisplay::new(model, faces, normals)),
+            None => ModelDisplay::Direct(normals),
         };
-        Self { facts: Arc::new(facts(session)), look }
+        Self { facts: Arc::new(facts(session)), display }
     }
 
     /// The present state of `session`.
-    pub fn scene(&self, session: &Session, later: &Later) -> Scene {
+    pub(super) fn scene(&self, session: &Session, layout: &LayoutState) -> Scene {
         let (model, design) = (session.model(), session.design());
-        let (summary, exportable) = words::summary(session);
+        let (summary, exportable) = remarks::summary(session);
         let strips = design.strips.iter().map(|s| Strip {
             id: StripId(s.id.0),
             polyline: s.curve.points(&model.loaded.mesh),
@@ -56,11 +59,11 @@ impl ModelSnapshot {
             index: Arc::clone(&model.index),
             surface: Arc::new(self.surface(session)),
             strips: strips.collect(),
-            remarks: words::remarks(session),
+            remarks: remarks::remarks(session),
             summary,
             exportable,
-            layout: later.preview(session).map(Arc::new),
-            embedding: later.embedded.as_ref().map(|e| Arc::clone(&e.summary)),
+            layout: layout.preview(session).map(Arc::new),
+            embedding: layout.optimised.as_ref().map(|o| Arc::clone(&o.summary)),
             detail: Detail { curvature_radius: model.options.curvature_radius, smoothing: model.options.smoothing },
             can_undo: session.can_undo(),
             can_redo: session.can_redo(),
@@ -68,26 +71,26 @@ impl ModelSnapshot {
     }
 
     fn surface(&self, session: &Session) -> DisplaySurface {
-        match (&self.look, &session.model().proxy) {
-            (Look::Covered(cover), Some(proxy)) => cover.surface(session, proxy),
-            (Look::Covered(_), None) => DisplaySurface::default(),
-            (Look::Itself(normals), _) => refined_surface(normals, session),
+        match (&self.display, &session.model().proxy) {
+            (ModelDisplay::Proxy(display), Some(proxy)) => display.surface(session, proxy),
+            (ModelDisplay::Proxy(_), None) => DisplaySurface::default(),
+            (ModelDisplay::Direct(normals), _) => refined_surface(normals, session),
         }
     }
 }
 
-/// A mesh that is woven on itself, refined by its strips.
+/// The design mesh, refined by its strips.
 fn refined_surface(normals: &[[DVec3; 3]], session: &Session) -> DisplaySurface {
     let (mesh, woven) = (&session.model().mesh, session.woven());
     let refined = &woven.arrangement.refined;
     let faces: Vec<[u32; 3]> = (0..refined.n_faces() as u32).map(|f| refined.corners(f)).collect();
     let normals = (0..faces.len() as u32).map(|f| face_normals(normals, mesh, refined, f)).collect();
-    // Before the first strip all is one region; to paint it red would say nothing.
+    // Without strips the whole surface is one region; its colour would say nothing.
     let regions = if session.design().strips.is_empty() {
         Vec::new()
     } else {
-        let color = |&r: &u32| words::color(woven.reports[r as usize].colour);
-        woven.arrangement.region_of_face.iter().map(color).collect()
+        let colour = |&r: &u32| remarks::region_colour(woven.reports[r as usize].colour);
+        woven.arrangement.region_of_face.iter().map(colour).collect()
     };
     let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
     let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
@@ -101,7 +104,7 @@ fn refined_surface(normals: &[[DVec3; 3]], session: &Session) -> DisplaySurface 
     }
 }
 
-/// The design mesh's normals at the corners of a refined face: refinement must not show in the shading.
+/// Normals of the design mesh at the corners of a refined face, so that the refinement does not show in the shading.
 fn face_normals(normals: &[[DVec3; 3]], mesh: &TriMesh, refined: &RefinedMesh, f: u32) -> [DVec3; 3] {
     let base = FaceId(refined.base_face(f));
     let corners = mesh.face_vertices(base);
@@ -109,21 +112,13 @@ fn face_normals(normals: &[[DVec3; 3]], mesh: &TriMesh, refined: &RefinedMesh, f
     refined.corners(f).map(|v| match corners.iter().position(|c| c.0 == v) {
         Some(corner) => normals[corner],
         None => {
-            let weights = weights(corners.map(|c| mesh.position(c)), refined.positions[v as usize]);
+            let weights = barycentric_inside(corners.map(|c| mesh.position(c)), refined.positions[v as usize]);
             (0..3).map(|i| normals[i] * weights[i]).sum()
         }
     })
 }
 
-/// The barycentric coordinates of `p`, which lies in the triangle's plane.
-fn weights(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let part = |i: usize| (corners[(i + 1) % 3] - p).cross(corners[(i + 2) % 3] - p).dot(normal).max(0.0);
-    let parts = [part(0), part(1), part(2)];
-    let sum: f64 = parts.iter().sum();
-    if sum > 0.0 { parts.map(|p| p / sum) } else { [1.0 / 3.0; 3] }
-}
-
+/// Size and topology of the model, as the panel lists them.
 fn facts(session: &Session) -> ModelFacts {
     let model = session.model();
     let mut facts = vec![
@@ -132,49 +127,18 @@ fn facts(session: &Session) -> ModelFacts {
         ("Genus".to_owned(), model.topology.genus.to_string()),
     ];
     if let Some(proxy) = &model.proxy {
-        facts.push(("Woven on a proxy of".to_owned(), grouped(proxy.mesh().n_faces())));
+        facts.push(("Triangles of the proxy".to_owned(), grouped(proxy.mesh().n_faces())));
     }
-    let mut several = |name: &str, n: usize, usual: usize| {
+    let mut unless = |usual: usize, name: &str, n: usize| {
         if n != usual {
             facts.push((name.to_owned(), grouped(n)));
         }
     };
-    several("Parts", model.topology.components.len(), 1);
-    several("Boundary loops", model.topology.boundary_loops.len(), 0);
+    unless(1, "Components", model.topology.components.len());
+    unless(0, "Boundary loops", model.topology.boundary_loops.len());
     ModelFacts {
         name: model.loaded.name.clone(),
         facts,
         repairs: model.loaded.repairs.iter().map(ToString::to_string).collect(),
-    }
-}
-
-/// A number with its digits in groups of three.
-fn grouped(n: usize) -> String {
-    let digits = n.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn digits_are_grouped() {
-        assert_eq!([0, 999, 1000, 1234567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
-    }
-
-    #[test]
-    fn weights_add_to_one_and_find_the_point() {
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.2, 0.9, 0.4)];
-        let p = corners[0] * 0.2 + corners[1] * 0.5 + corners[2] * 0.3;
-        let w = weights(corners, p);
-        assert!((w[0] - 0.2).abs() < 1e-12 && (w[1] - 0.5).abs() < 1e-12 && (w[2] - 0.3).abs() < 1e-12);
     }
 }

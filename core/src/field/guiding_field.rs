@@ -12,9 +12,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::cross_field::CrossField;
+use super::error::{FieldError, expect_length};
 use super::singularities::Singularity;
 use super::smoothing::edge_weight;
-use super::{CrossField, FieldError, expect_length};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Progress;
 use crate::solve::{SparseHermitian, SpdFactor, SpdSymbolic, c64};

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dual::vertex_curvatures;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
-use crate::field::{AlignmentDirections, feature_aligned_field, pronounced};
+use crate::field::{AlignmentDirections, cancel_opposite_pairs, feature_aligned_field};
 use crate::mesh::{
     LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
 };
@@ -217,9 +217,10 @@ fn shape_corners(
     }
     let guides = AlignmentDirections { directions: &directions, weights: &weights, radius: GUIDE_RADIUS };
     match feature_aligned_field(mesh, &metric, Some(guides), sharp, progress) {
-        Ok(field) => {
-            Ok(pronounced(mesh, &field.singularities, CORNER_RADIUS).into_iter().map(|s| (s.vertex, s.index)).collect())
-        }
+        Ok(field) => Ok(cancel_opposite_pairs(mesh, &field.singularities, CORNER_RADIUS)
+            .into_iter()
+            .map(|s| (s.vertex, s.index))
+            .collect()),
         Err(error) => {
             progress.check()?;
             tracing::warn!(%error, "no shape field: corners of the shape are not assessed");

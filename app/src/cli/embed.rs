@@ -86,14 +86,14 @@ pub(super) fn summary(export: &Export) -> String {
     if let Some(Ok(report)) = &export.optimised {
         let (before, after) = (report.energy_before, report.energy_after);
         text += &format!(", energy {before:.4} to {after:.4} in {} steps", report.steps);
-        if !report.collapsed.is_empty() {
-            text += &format!(", {} chords collapsed", report.collapsed.len());
+        if !report.collapsed_chords.is_empty() {
+            text += &format!(", {} chords collapsed", report.collapsed_chords.len());
         }
     }
     if let Some(Ok(report)) = &export.optimised
-        && report.features.all > 0
+        && report.features.total > 0
     {
-        text += &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.all);
+        text += &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.total);
     }
     let m = export.measures();
     text += &format!(

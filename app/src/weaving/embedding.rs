@@ -224,13 +224,13 @@ fn finished(session: &Session, drawn: &InitialLayout, embedded: OptimisedEmbeddi
     let summary = EmbeddingSummary {
         steps: report.steps,
         energy: [report.energy_before, report.energy_after],
-        flipped: [report.flipped_before, report.folds.len()],
+        flipped: [report.flipped_before, report.remaining_flips.len()],
         conformal: report.measures.conformal,
         alignment: report.measures.alignment,
         planar: report.measures.planar,
         aspect: most_oblong(&embedded.maps, &patches),
         features: features(&report.features),
-        folds: folds(report.folds.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)))),
+        folds: folds(report.remaining_flips.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)))),
         triangles: distortion,
     };
     let (nodes, arcs) = drawing(&embedded.embedding);
@@ -256,7 +256,7 @@ fn most_oblong(maps: &[PatchMap], patches: &[PatchMeasures]) -> (f64, DVec3) {
 /// Sharp edges on isolines, in all, and the middle of the first that is not on one.
 fn features(edges: &FeatureEdges) -> (usize, usize, Option<DVec3>) {
     let middle = |ends: &[[f64; 3]; 2]| ends.iter().map(|&p| DVec3::from_array(p)).sum::<DVec3>() / 2.0;
-    (edges.on_isolines, edges.all, edges.off.first().map(middle))
+    (edges.on_isolines, edges.total, edges.off_isolines.first().map(middle))
 }
 
 /// One remark for each reason, with the first place.

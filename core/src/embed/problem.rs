@@ -31,18 +31,20 @@ pub struct Settings {
     pub sizing: bool,
     /// Least length of an arc in the map, as a multiple of the mean edge length of the mesh.
     pub spacing: f64,
-    /// Length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: such chords are kept at
-    /// the least length.
+    /// Length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: such chords are kept
+    /// at the least length.
     pub collapse: Option<f64>,
-    /// Whether chords are collapsed one by one as long as that makes the layout less irregular without raising the energy.
+    /// Whether chords are collapsed one by one as long as that makes the layout less irregular without raising the
+    /// energy.
     pub simplify: bool,
-    /// Edge length that all chord lengths are to be multiples of, in the same unit as `collapse`; `None`: lengths are free.
+    /// Edge length that all chord lengths are to be multiples of, in the same unit as `collapse`; `None`: lengths are
+    /// free.
     pub integer: Option<f64>,
 }
 
 impl Default for Settings {
-    /// Steps, halvings, anisotropy and sizing as in the thesis (sections 6.4.3 and 6.5.1). With a `spacing` of 1.5 a patch is
-    /// wide enough to be resolved by triangles.
+    /// Steps, halvings, anisotropy and sizing as in the thesis (sections 6.4.3 and 6.5.1). With a `spacing` of 1.5 a
+    /// patch is wide enough to be resolved by triangles.
     fn default() -> Self {
         Self {
             steps: 25,
@@ -70,8 +72,8 @@ pub struct Problem<'a> {
     pub arc_headings: &'a [ArcHeadings],
     /// Whether each node keeps its initial position; empty: none does.
     pub pinned_nodes: &'a [bool],
-    /// Whether the two end nodes of each arc keep their initial positions; empty: none does. Between its ends the arc is
-    /// an isoline like any other.
+    /// Whether the two end nodes of each arc keep their initial positions; empty: none does. Between its ends the arc
+    /// is an isoline like any other.
     pub pinned_arcs: &'a [bool],
     /// The settings.
     pub settings: Settings,

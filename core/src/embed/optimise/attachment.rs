@@ -1,9 +1,10 @@
 //! Attachment of nodes to features.
 //!
-//! Arcs tie nodes to features: if a chain of arcs runs from a corner of a feature along it to a node, the node has the constant
-//! coordinate of the feature, and a map in which the feature is an isoline squeezes all triangles between both. Squeezed
-//! triangles therefore reveal such nodes; distance on the surface does not. They are moved onto the feature, along edges and
-//! with their arcs, and stay on it from then on. Unconstrained regular nodes follow if their crossing lies on a feature.
+//! Arcs tie nodes to features: if a chain of arcs runs from a corner of a feature along it to a node, the node has the
+//! constant coordinate of the feature, and a map in which the feature is an isoline squeezes all triangles between
+//! both. Squeezed triangles therefore reveal such nodes; distance on the surface does not. They are moved onto the
+//! feature, along edges and with their arcs, and stay on it from then on. Unconstrained regular nodes follow if their
+//! crossing lies on a feature.
 
 use glam::DVec2;
 
@@ -17,13 +18,14 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::progress::Progress;
 
-/// Largest ratio of the distance between a constrained node and its feature in the map to their distance on the surface, both
-/// in lengths of the feature edge, at which the node is attached. Chosen by hand.
+/// Largest ratio of the distance between a constrained node and its feature in the map to their distance on the
+/// surface, both in lengths of the feature edge, at which the node is attached. Chosen by hand.
 const SQUEEZED: f64 = 0.1;
-/// Largest distance in the map, in lengths of the feature edge, of the crossing of a regular node at which it is attached.
+/// Largest distance in the map, in lengths of the feature edge, of the crossing of a regular node at which it is
+/// attached.
 const NEAR: f64 = 0.1;
-/// Largest ratio of the distance of a node from a stepping line to the step, both in the map, at which the node is attached:
-/// equality with some tolerance.
+/// Largest ratio of the distance of a node from a stepping line to the step, both in the map, at which the node is
+/// attached: equality with some tolerance.
 const STEP_RATIO: f64 = 1.2;
 
 /// The foot of the perpendicular from a point to an edge, in the map.
@@ -88,9 +90,9 @@ impl Optimiser<'_> {
         self.move_to_targets(targets, progress)
     }
 
-    /// Attaches irregular nodes to feature lines that step from one isoline to another at relaxed edges, if the node is no
-    /// farther from the line than it steps: such a line leaves the isoline of the node in order to pass it. Returns their
-    /// number.
+    /// Attaches irregular nodes to feature lines that step from one isoline to another at relaxed edges, if the node is
+    /// no farther from the line than it steps: such a line leaves the isoline of the node in order to pass it. Returns
+    /// their number.
     ///
     /// # Errors
     ///
@@ -183,8 +185,9 @@ impl Optimiser<'_> {
         topology
     }
 
-    /// The target of a free node, if it has one: the first vertex that `beside` returns in a search outward from the node, given
-    /// the node, a feature edge and the coordinates the node is to have, in the chart of the edge's triangle.
+    /// The target of a free node, if it has one: the first vertex that `beside` returns in a search outward from the
+    /// node, given the node, a feature edge and the coordinates the node is to have, in the chart of the edge's
+    /// triangle.
     fn target_of(
         &self,
         i: usize,
@@ -213,8 +216,8 @@ impl Optimiser<'_> {
     fn squeezed_to(&self, i: usize, h: HalfedgeId, at: DVec2) -> Option<VertexId> {
         let mesh = &self.state.topology.mesh;
         let foot = Foot::new(&self.state, h, at);
-        // A constrained node has coordinates of its own, to be compared with its distance on the surface. The coordinates of
-        // an unconstrained one are those of its crossing.
+        // A constrained node has coordinates of its own, to be compared with its distance on the surface. The
+        // coordinates of an unconstrained one are those of its crossing.
         let far = mesh.position(self.state.topology.nodes[i].vertex).distance(mesh.position(mesh.origin(h)));
         let near = if self.through_arcs.constrained[i] { SQUEEZED * far / mesh.vector(h).length() } else { NEAR };
         (foot.is_inside() && foot.far < near * foot.length).then(|| foot.end(&self.state))

@@ -1,8 +1,8 @@
 //! Descent of the energy over node positions (Campen, sections 6.5.1 to 6.5.3).
 //!
-//! A step moves all nodes and solves for field and map. It is kept if the energy has fallen; otherwise it is undone, and the
-//! next step is half as long. Beyond the thesis, every node has a step size of its own, and a step that fails because of a few
-//! nodes is repeated without these.
+//! A step moves all nodes and solves for field and map. It is kept if the energy has fallen; otherwise it is undone,
+//! and the next step is half as long. Beyond the thesis, every node has a step size of its own, and a step that fails
+//! because of a few nodes is repeated without these.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::nearest_node::nearest_nodes;
@@ -13,17 +13,17 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::FaceId;
 use crate::progress::Progress;
 
-/// Share of the energy that a step of the injective phase has to gain, and how many steps in a row may gain less before the
-/// descent ends. The energy is bounded below by that of the ideal map, so that the share is one of what matters, unlike in the
-/// least-squares phase. Chosen by hand.
+/// Share of the energy that a step of the injective phase has to gain, and how many steps in a row may gain less before
+/// the descent ends. The energy is bounded below by that of the ideal map, so that the share is one of what matters,
+/// unlike in the least-squares phase. Chosen by hand.
 const MIN_GAIN: f64 = 3e-3;
 const MAX_IDLE: usize = 2;
-/// Largest number of halvings of a step of the injective phase: measured, a step that fails at a quarter of its length fails at
-/// any length, for another reason.
+/// Largest number of halvings of a step of the injective phase: measured, a step that fails at a quarter of its length
+/// fails at any length, for another reason.
 const INJECTIVE_HALVINGS: usize = 2;
-/// Number of steps after which the least-squares map is judged, and the largest number of flipped triangles it may then have.
-/// With more, the map as a whole contradicts its constraints; starting the injective phase from the initial embedding is faster
-/// then, and finds a map.
+/// Number of steps after which the least-squares map is judged, and the largest number of flipped triangles it may then
+/// have. With more, the map as a whole contradicts its constraints; starting the injective phase from the initial
+/// embedding is faster then, and finds a map.
 const TRIAL_STEPS: usize = 4;
 pub(super) const MAX_FLIPPED: usize = 50;
 /// Cosine between successive steps of a node above which its step size grows, and below whose negative it is halved.
@@ -50,8 +50,8 @@ impl Optimiser<'_> {
         self.steps as f64 / self.settings.steps.max(1) as f64
     }
 
-    /// Moves all nodes by one step. Returns whether the energy has fallen; if not, the state is as before and the next step
-    /// half as long.
+    /// Moves all nodes by one step. Returns whether the energy has fallen; if not, the state is as before and the next
+    /// step half as long.
     ///
     /// # Errors
     ///
@@ -89,9 +89,9 @@ impl Optimiser<'_> {
         self.chord_lengths.fix_short(topology, &self.through_arcs, &self.chord_of, &solution.map, self.min_length)
     }
 
-    /// The state with all nodes moved that can move without flipping triangles; `None` if too few can. Where the energy would
-    /// rise, it is solved for once more without the nodes around which it rises. The step sizes of all nodes left behind are
-    /// halved.
+    /// The state with all nodes moved that can move without flipping triangles; `None` if too few can. Where the energy
+    /// would rise, it is solved for once more without the nodes around which it rises. The step sizes of all nodes left
+    /// behind are halved.
     fn next_state(&mut self, progress: &Progress) -> Result<Option<State>, EmbeddingError> {
         let none = vec![false; self.step_factor.len()];
         let (mut next, mut stays) = self.solve_moved(Self::moved, none, progress)?;
@@ -125,9 +125,9 @@ impl Optimiser<'_> {
         change.iter().map(|&c| c > 0.0).collect()
     }
 
-    /// The state with nodes moved, but for those that `stays` marks. While no injective map is found, nodes in whose cells
-    /// triangles flip are marked as well; `None` once more than half of all are marked. `moved` makes the topology, given the
-    /// cells and the marks. Returned as well are the marks.
+    /// The state with nodes moved, but for those that `stays` marks. While no injective map is found, nodes in whose
+    /// cells triangles flip are marked as well; `None` once more than half of all are marked. `moved` makes the
+    /// topology, given the cells and the marks. Returned as well are the marks.
     pub(super) fn solve_moved(
         &mut self,
         moved: impl Fn(&Self, &[u32], &[bool]) -> EmbeddingTopology,

@@ -1,10 +1,11 @@
 //! Features become isolines: penalty continuation up to hard constraints.
 //!
-//! Constraining all features at once flips triangles; a penalty brings them only near isolines. So the penalty weight is raised
-//! step by step, each map starting from the one before, which is injective and stays so. What cannot follow becomes visible:
-//! between a feature and a node that belongs on it triangles are squeezed, and the node is moved there
-//! ([`attachment`](super::attachment)); edges that keep slanting against their isoline contradict the layout and are relaxed to
-//! the unit penalty. The other edges then lie on isolines up to rounding, and hard constraints do not change the map.
+//! Constraining all features at once flips triangles; a penalty brings them only near isolines. So the penalty weight
+//! is raised step by step, each map starting from the one before, which is injective and stays so. What cannot follow
+//! becomes visible: between a feature and a node that belongs on it triangles are squeezed, and the node is moved there
+//! ([`attachment`](super::attachment)); edges that keep slanting against their isoline contradict the layout and are
+//! relaxed to the unit penalty. The other edges then lie on isolines up to rounding, and hard constraints do not change
+//! the map.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
@@ -19,22 +20,22 @@ use crate::progress::Progress;
 
 /// Fraction of the whole optimisation at which the continuation is reported to begin, 0 to 1.
 const REPORTED_FRACTION: f64 = 0.85;
-/// Penalty weights of the first part of the continuation, in which nodes that belong on features are found; as multiples of the
-/// unit penalty.
+/// Penalty weights of the first part of the continuation, in which nodes that belong on features are found; as
+/// multiples of the unit penalty.
 const FIRST_WEIGHTS: [f64; 3] = [10.0, 100.0, 1e3];
 /// Largest number of rounds of the first part. Chosen by hand.
 const ATTACHMENT_ROUNDS: usize = 3;
-/// Penalty weights of the second part, and after each the largest slope of an edge against its isoline (difference of the
-/// constant coordinate over the length in the map, 0 to 1) that is not relaxed. Slopes of edges that can follow fall with the
-/// weight. Chosen by hand.
+/// Penalty weights of the second part, and after each the largest slope of an edge against its isoline (difference of
+/// the constant coordinate over the length in the map, 0 to 1) that is not relaxed. Slopes of edges that can follow
+/// fall with the weight. Chosen by hand.
 const LAST_WEIGHTS: [(f64, f64); 3] = [(1e3, 0.2), (1e4, 0.1), (1e6, 0.02)];
 /// Largest number of Newton steps for each weight.
 const NEWTON_STEPS: usize = 15;
-/// Share of the length of a feature line, 0 to 1, above which relaxed edges relax the whole line: constraining the pieces that
-/// remain costs distortion, and they do not make a line.
+/// Share of the length of a feature line, 0 to 1, above which relaxed edges relax the whole line: constraining the
+/// pieces that remain costs distortion, and they do not make a line.
 const BROKEN_SHARE: f64 = 0.2;
-/// Attempts to solve with hard constraints, each with features relaxed one ring farther around the flipped triangles. Chosen by
-/// hand.
+/// Attempts to solve with hard constraints, each with features relaxed one ring farther around the flipped triangles.
+/// Chosen by hand.
 const RELAXATIONS: usize = 6;
 
 impl Optimiser<'_> {
@@ -62,7 +63,8 @@ impl Optimiser<'_> {
             reached = FIRST_WEIGHTS[FIRST_WEIGHTS.len() - 1];
         }
         let mut relaxed = self.raise_penalty(progress)?;
-        // A relaxed edge may be due to a node beside its line: attach such nodes as long as that leaves fewer relaxed edges.
+        // A relaxed edge may be due to a node beside its line: attach such nodes as long as that leaves fewer relaxed
+        // edges.
         while relaxed > 0 {
             let before = (self.state.clone(), self.projection.node_constraint.clone(), self.relaxed.clone());
             let attached = self.attach_nodes_at_steps(progress)?;
@@ -91,13 +93,13 @@ impl Optimiser<'_> {
         Ok(self.relaxed.iter().filter(|&&l| l).count())
     }
 
-    /// Solves for field and map with all nodes in place. Features near flipped triangles are relaxed, then those farther
-    /// around, and in the end all.
+    /// Solves for field and map with all nodes in place. Features near flipped triangles are relaxed, then those
+    /// farther around, and in the end all.
     ///
     /// # Errors
     ///
-    /// [`EmbeddingError::NoInjectiveMap`] if there is no injective map even with all features relaxed; the state is then as
-    /// before.
+    /// [`EmbeddingError::NoInjectiveMap`] if there is no injective map even with all features relaxed; the state is
+    /// then as before.
     pub(super) fn solve_relaxing_features(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         for round in 1..=RELAXATIONS {
             match self.try_solve_in_place(progress)? {
@@ -123,7 +125,8 @@ impl Optimiser<'_> {
         self.relaxed.clear();
     }
 
-    /// Solves again if the system of the map is not that of the state: failed attempts leave the system of another topology.
+    /// Solves again if the system of the map is not that of the state: failed attempts leave the system of another
+    /// topology.
     pub(super) fn synchronise(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let Solution { map, free, .. } = &self.state.solution;
         let is_own = |system: &SeamlessSystem| system.n_free() == free.len() && system.map(free).uv == map.uv;
@@ -140,8 +143,8 @@ impl Optimiser<'_> {
         self.converge_map(progress)
     }
 
-    /// Descends the energy of the injective map with nodes and field frozen. The few Newton steps between node steps do not
-    /// converge.
+    /// Descends the energy of the injective map with nodes and field frozen. The few Newton steps between node steps do
+    /// not converge.
     ///
     /// # Errors
     ///
@@ -175,9 +178,9 @@ impl Optimiser<'_> {
         self.relaxed.get(self.state.topology.mesh.edge(h).index()).copied().unwrap_or(false)
     }
 
-    /// Relaxes edges whose slope against their isoline exceeds `slope`. Along a line that cannot keep to one isoline the
-    /// penalty spreads the difference evenly from vertex to vertex, so that its shortest edges have the largest slope; without
-    /// one or two of these the rest can follow.
+    /// Relaxes edges whose slope against their isoline exceeds `slope`. Along a line that cannot keep to one isoline
+    /// the penalty spreads the difference evenly from vertex to vertex, so that its shortest edges have the largest
+    /// slope; without one or two of these the rest can follow.
     fn relax_slanting_edges(&mut self, slope: f64) {
         let mut list = self.feature_edges();
         list.retain(|&(h, _)| !self.is_relaxed(h));

@@ -1,4 +1,5 @@
-//! The end of a phase: all nodes are constrained to their isolines, chord lengths are rounded, flipped triangles removed.
+//! The end of a phase: all nodes are constrained to their isolines, chord lengths are rounded, flipped triangles
+//! removed.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::descent::MAX_FLIPPED;
@@ -18,8 +19,8 @@ const CROSSING_STEPS: usize = 3;
 const CROSSINGS_REACHED: f64 = 3e-3;
 
 impl Optimiser<'_> {
-    /// Ends the phase: moves regular nodes to the crossings of their isolines, constrains them there, rounds chord lengths if
-    /// asked for, and removes flipped triangles. Returns the flipped triangles that remain.
+    /// Ends the phase: moves regular nodes to the crossings of their isolines, constrains them there, rounds chord
+    /// lengths if asked for, and removes flipped triangles. Returns the flipped triangles that remain.
     ///
     /// # Errors
     ///
@@ -60,8 +61,8 @@ impl Optimiser<'_> {
         Ok(unfolded.folds)
     }
 
-    /// As [`Self::finalise`] in the injective phase, where no triangle is flipped. Features come first: regular nodes are then
-    /// placed on features where they cross them.
+    /// As [`Self::finalise`] in the injective phase, where no triangle is flipped. Features come first: regular nodes
+    /// are then placed on features where they cross them.
     fn finalise_injective(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         self.constrain_features(progress)?;
         self.place_regular_nodes(progress)?;
@@ -99,8 +100,8 @@ impl Optimiser<'_> {
         Ok(())
     }
 
-    /// Stiffens flipped triangles until none is left or the rounds are over, and keeps the map with the fewest (Bommes, Zimmer
-    /// and Kobbelt, Mixed-Integer Quadrangulation, section 5.4). Those that remain are few and local.
+    /// Stiffens flipped triangles until none is left or the rounds are over, and keeps the map with the fewest (Bommes,
+    /// Zimmer and Kobbelt, Mixed-Integer Quadrangulation, section 5.4). Those that remain are few and local.
     fn stiffen(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let Some(mut system) = self.systems.map.take() else { return Ok(()) };
         let mut weight = vec![1.0; self.state.topology.mesh.n_faces()];

@@ -1,9 +1,10 @@
-//! The start of the injective phase: from the initial embedding, from a least-squares map, or from the map of a coarser mesh.
+//! The start of the injective phase: from the initial embedding, from a least-squares map, or from the map of a coarser
+//! mesh.
 //!
-//! An initial embedding with every patch mapped bijectively onto its rectangle, with opposite sides of equal length, is an
-//! injective seamless map of the whole surface, whatever its distortion. From any start the energy
-//! ([`InjectiveEnergy`](crate::param::InjectiveEnergy)) is descended with arcs constrained to isolines but otherwise free to
-//! move on the surface.
+//! An initial embedding with every patch mapped bijectively onto its rectangle, with opposite sides of equal length, is
+//! an injective seamless map of the whole surface, whatever its distortion. From any start the energy
+//! ([`InjectiveEnergy`](crate::param::InjectiveEnergy)) is descended with arcs constrained to isolines but otherwise
+//! free to move on the surface.
 
 use glam::{DVec2, DVec3};
 
@@ -22,19 +23,20 @@ use crate::param::DistortionWeights;
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
-/// Weight λ of the size term of the energy: large enough to keep limbs and the patches of one chord from shrinking to nothing,
-/// small enough not to distort angles. Measured with 0.06, 0.03 and 0.02: the conformal distortion of botijo (99 patches) is
-/// 2.064, 2.056 and 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with a strength of principal directions of 3.4.
+/// Weight λ of the size term of the energy: large enough to keep limbs and the patches of one chord from shrinking to
+/// nothing, small enough not to distort angles. Measured with 0.06, 0.03 and 0.02: the conformal distortion of botijo
+/// (99 patches) is 2.064, 2.056 and 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with a strength of principal
+/// directions of 3.4.
 const SIZE_WEIGHT: f64 = 0.02;
-/// The same for surfaces whose shape is given by features, whose constraints squeeze the triangles between them: with less,
-/// some features of the fan disk cannot be constrained.
+/// The same for surfaces whose shape is given by features, whose constraints squeeze the triangles between them: with
+/// less, some features of the fan disk cannot be constrained.
 const SIZE_WEIGHT_FEATURES: f64 = 0.06;
 /// Largest number of Newton steps of the first map; it has converged long before.
 const FIRST_NEWTON_STEPS: usize = 60;
 
 impl<'a> Optimiser<'a> {
-    /// Sets up the injective phase from the harmonic maps of the patches of the initial embedding. The result is [`Flipped`] if
-    /// these flip triangles.
+    /// Sets up the injective phase from the harmonic maps of the patches of the initial embedding. The result is
+    /// [`Flipped`] if these flip triangles.
     ///
     /// # Errors
     ///
@@ -55,8 +57,8 @@ impl<'a> Optimiser<'a> {
         Self::injective(problem, prepared, start, 1.0, progress)
     }
 
-    /// Sets up the injective phase from the final map of another phase. The result is [`Flipped`] if that flips triangles which
-    /// cannot be untangled.
+    /// Sets up the injective phase from the final map of another phase. The result is [`Flipped`] if that flips
+    /// triangles which cannot be untangled.
     ///
     /// # Errors
     ///
@@ -72,8 +74,9 @@ impl<'a> Optimiser<'a> {
         Self::injective(problem, prepared, start, 1.0, progress)
     }
 
-    /// Sets up the injective phase on a prepared topology from an initial map, descended by the given number of Newton steps, with
-    /// the given penalty weight of features. The result is [`Flipped`] if there is no injective map near the initial one.
+    /// Sets up the injective phase on a prepared topology from an initial map, descended by the given number of Newton
+    /// steps, with the given penalty weight of features. The result is [`Flipped`] if there is no injective map near
+    /// the initial one.
     ///
     /// # Errors
     ///
@@ -158,7 +161,8 @@ impl MappedEmbedding {
         self.mesh.edges().map(|e| lies(self.mesh.halfedge(e)).unwrap_or(false)).collect()
     }
 
-    /// The principal curvatures at the vertices. A vertex that was added has those of the nearest corner of its base triangle.
+    /// The principal curvatures at the vertices. A vertex that was added has those of the nearest corner of its base
+    /// triangle.
     fn curvature(&self, surface: &Surface<'_>) -> Vec<PrincipalCurvature> {
         let n = surface.mesh.n_vertices();
         let at = |v: VertexId| {

@@ -1,18 +1,19 @@
 //! The mixed-integer option: chord lengths become whole multiples of an edge length (Campen, section 6.7).
 //!
-//! A layout is refined to quads of edge length `q` by unit squares only if all its nodes lie on the corners of a grid of width
-//! `q`. All arcs of a chord have the same length, and rectangles whose sides agree make a map whatever their sizes, so that the
-//! integers are one multiple of `q` for each chord, and any positive ones are feasible. They are found greedily (Bommes, Zimmer
-//! and Kobbelt, Mixed-Integer Quadrangulation, section 4): chords nearest to a multiple are fixed there, the map is solved for
-//! again, and so on. Nodes are optimised before with free lengths, and again afterwards.
+//! A layout is refined to quads of edge length `q` by unit squares only if all its nodes lie on the corners of a grid
+//! of width `q`. All arcs of a chord have the same length, and rectangles whose sides agree make a map whatever their
+//! sizes, so that the integers are one multiple of `q` for each chord, and any positive ones are feasible. They are
+//! found greedily (Bommes, Zimmer and Kobbelt, Mixed-Integer Quadrangulation, section 4): chords nearest to a multiple
+//! are fixed there, the map is solved for again, and so on. Nodes are optimised before with free lengths, and again
+//! afterwards.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::chord_lengths::{FixedLength, chord_lengths};
 use crate::progress::Progress;
 
-/// Share of the open chords that is rounded before the map is solved for again, 0 to 1. Chosen by hand; with less there are more
-/// solves.
+/// Share of the open chords that is rounded before the map is solved for again, 0 to 1. Chosen by hand; with less there
+/// are more solves.
 const ROUNDED_SHARE: f64 = 0.25;
 /// Factor of the least length below which rounding of numbers cannot push a multiple of `q` that equals it.
 const TOLERANCE: f64 = 0.999;
@@ -39,8 +40,8 @@ impl Optimiser<'_> {
         Ok(())
     }
 
-    /// The chords that are not rounded yet: the distance to the nearest allowed multiple in edge lengths, the chord, and the length
-    /// it would be fixed at; sorted by that distance.
+    /// The chords that are not rounded yet: the distance to the nearest allowed multiple in edge lengths, the chord,
+    /// and the length it would be fixed at; sorted by that distance.
     fn open_chords(&self, edge: f64) -> Vec<(f64, usize, FixedLength)> {
         let (topology, map) = (&self.state.topology, &self.state.solution.map);
         let fixed = &self.chord_lengths.fixed;

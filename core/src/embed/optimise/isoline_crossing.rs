@@ -1,8 +1,8 @@
 //! The crossing of the two isolines of a regular node, and the step there.
 //!
-//! The through-arcs of a regular node lead to constrained nodes, whose coordinates determine its two isolines. The differences
-//! to its own coordinates are a step in the map; the gradients of the map turn it into a step on the surface. On a through-arc
-//! without constrained nodes all nodes take the mean of their coordinates.
+//! The through-arcs of a regular node lead to constrained nodes, whose coordinates determine its two isolines. The
+//! differences to its own coordinates are a step in the map; the gradients of the map turn it into a step on the
+//! surface. On a through-arc without constrained nodes all nodes take the mean of their coordinates.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -15,14 +15,14 @@ use crate::mesh::{FaceId, HalfedgeId};
 use crate::param::SeamlessMap;
 use crate::surface::Metric;
 
-/// Ratio of the Jacobian determinant of a map to half the sum of its squared gradients, 1 for similarities, up to which the map
-/// is too flat to be inverted. Chosen by hand.
+/// Ratio of the Jacobian determinant of a map to half the sum of its squared gradients, 1 for similarities, up to which
+/// the map is too flat to be inverted. Chosen by hand.
 const FLAT: f64 = 0.05;
 /// Largest number of triangles between a node and its crossing or its feature. Chosen by hand.
 const MAX_RINGS: usize = 24;
 
-/// The step from a regular node with the given half-arcs to the crossing of its isolines, as a vector in the plane of the
-/// triangle of the returned corner; `None` where the map does not determine it.
+/// The step from a regular node with the given half-arcs to the crossing of its isolines, as a vector in the plane of
+/// the triangle of the returned corner; `None` where the map does not determine it.
 pub(super) fn step_to_crossing(
     topology: &EmbeddingTopology,
     through_arcs: &ThroughArcs,
@@ -39,8 +39,8 @@ pub(super) fn step_to_crossing(
         .then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
 }
 
-/// The coordinates of the crossing of the isolines of a regular node, in the chart of the triangle of the returned corner;
-/// `None` where the map does not determine it.
+/// The coordinates of the crossing of the isolines of a regular node, in the chart of the triangle of the returned
+/// corner; `None` where the map does not determine it.
 pub(super) fn crossing(
     topology: &EmbeddingTopology,
     through_arcs: &ThroughArcs,
@@ -49,8 +49,8 @@ pub(super) fn crossing(
 ) -> Option<(HalfedgeId, DVec2)> {
     let mesh = &topology.mesh;
     let corner = through_arcs.corner(topology, *half_arcs.first()?);
-    // For each coordinate the difference to the constrained node at the end of the shortest chain, with its length; and the
-    // sum of the differences to unconstrained nodes, with their number and the node itself.
+    // For each coordinate the difference to the constrained node at the end of the shortest chain, with its length; and
+    // the sum of the differences to unconstrained nodes, with their number and the node itself.
     let mut constrained: [Option<(usize, f64)>; 2] = [None; 2];
     let mut free = [(0.0, 1.0); 2];
     for &end in half_arcs {
@@ -78,9 +78,9 @@ fn at(map: &SeamlessMap, corner: HalfedgeId) -> DVec2 {
     map.uv[corner.index() / 3][corner.index() % 3]
 }
 
-/// Breadth-first search over triangles for a point of the map. It starts from triangles given with the coordinates of the point
-/// in their charts; every triangle is shown to `found` with the point in its own chart. Returned are the result of `found` and
-/// the triangles from there back to the start.
+/// Breadth-first search over triangles for a point of the map. It starts from triangles given with the coordinates of
+/// the point in their charts; every triangle is shown to `found` with the point in its own chart. Returned are the
+/// result of `found` and the triangles from there back to the start.
 pub(super) fn search_outward<T>(
     topology: &EmbeddingTopology,
     map: &SeamlessMap,

@@ -1,5 +1,5 @@
-//! The discrete Voronoi diagram of the nodes by Dijkstra's algorithm along edges: a step stays in the cell of its node (Campen,
-//! section 6.6.2).
+//! The discrete Voronoi diagram of the nodes by Dijkstra's algorithm along edges: a step stays in the cell of its node
+//! (Campen, section 6.6.2).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

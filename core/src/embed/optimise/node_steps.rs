@@ -1,5 +1,5 @@
-//! The step of each node: irregular nodes descend the energy (Campen, sections 6.5.1 and 6.6.2), unconstrained regular nodes
-//! move to the crossing of their isolines.
+//! The step of each node: irregular nodes descend the energy (Campen, sections 6.5.1 and 6.6.2), unconstrained regular
+//! nodes move to the crossing of their isolines.
 
 use std::f64::consts::TAU;
 
@@ -14,8 +14,8 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{TriMesh, VertexId};
 use crate::surface::{Metric, PolarMap};
 
-/// Ratio of the step length to the length of the estimated gradient: α = 0.75 of the way to the minimum, and the estimator is
-/// 3/2 of the gradient (sections 6.5.1 and 6.6.2).
+/// Ratio of the step length to the length of the estimated gradient: α = 0.75 of the way to the minimum, and the
+/// estimator is 3/2 of the gradient (sections 6.5.1 and 6.6.2).
 const STEP_SIZE: f64 = 0.75 * 2.0 / 3.0;
 
 impl Optimiser<'_> {
@@ -30,13 +30,14 @@ impl Optimiser<'_> {
         if d.is_finite() { self.in_space(&topology.mesh, metric, v, d).normalize_or_zero() } else { DVec3::ZERO }
     }
 
-    /// The descent direction at a vertex, as a vector of its polar map, scaled such that its length is proportional to the
-    /// distance to the minimum.
+    /// The descent direction at a vertex, as a vector of its polar map, scaled such that its length is proportional to
+    /// the distance to the minimum.
     fn descent_step(&self, v: VertexId) -> DVec2 {
         let State { topology, metric, field, objective, anisotropy_share, solution } = &self.state;
         let (mesh, angle, uv) = (&topology.mesh, &field.angle, &solution.map.uv);
         match self.distortion {
-            // With weights of 1 and ρ instead of 1 and 1 the energy is steeper by their mean, but its minimum is no farther.
+            // With weights of 1 and ρ instead of 1 and 1 the energy is steeper by their mean, but its minimum is no
+            // farther.
             None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
             // Around its minimum the energy of injective maps rises half as fast.
             Some(distortion) => {
@@ -65,7 +66,8 @@ impl Optimiser<'_> {
             }
             match self.projection.node_constraint[i] {
                 NodeConstraint::Free => {
-                    // The polar map is that of the mesh before the step: in the cell of the node nothing else has changed.
+                    // The polar map is that of the mesh before the step: in the cell of the node nothing else has
+                    // changed.
                     self.projection.move_free(&mut moved, metric, i, step, cell);
                 }
                 NodeConstraint::Curve => {
@@ -109,8 +111,8 @@ impl Optimiser<'_> {
         metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
     }
 
-    /// The topology with unconstrained regular nodes, and only these, moved to the crossings of their isolines, but for those
-    /// that `stays` marks.
+    /// The topology with unconstrained regular nodes, and only these, moved to the crossings of their isolines, but for
+    /// those that `stays` marks.
     pub(super) fn with_regular_nodes_moved(&self, cell: &[u32], stays: &[bool]) -> EmbeddingTopology {
         let mut moved = self.state.topology.clone();
         for i in (0..moved.nodes.len()).filter(|&i| !stays[i] && !self.through_arcs.constrained[i]) {

@@ -1,7 +1,7 @@
 //! The state of an optimisation: topology, field and map, and the solves for them (Campen, sections 6.3 to 6.5).
 //!
-//! An optimiser works in one of two phases. In the least-squares phase maps may flip triangles; in the injective phase, with
-//! [`DistortionWeights`], every state is an injective map. The other files of the room are its operations:
+//! An optimiser works in one of two phases. In the least-squares phase maps may flip triangles; in the injective phase,
+//! with [`DistortionWeights`], every state is an injective map. The other files of the room are its operations:
 //! [`descent`](super::descent) moves the nodes, [`finalise`](super::finalise) ends the phase.
 
 use glam::{DVec2, DVec3};
@@ -22,8 +22,8 @@ use crate::param::{DistortionWeights, gradients};
 use crate::progress::Progress;
 use crate::surface::{Metric, PrincipalCurvature};
 
-/// Newton steps of an injective map after the nodes have moved. The first ones correct the guess; more would be spent on a map
-/// that the next node step changes again.
+/// Newton steps of an injective map after the nodes have moved. The first ones correct the guess; more would be spent
+/// on a map that the next node step changes again.
 const NEWTON_STEPS: usize = 4;
 /// Rings of triangles around a vertex that a node has left or come to in which the field turns markedly.
 const TURNING_RINGS: usize = 2;
@@ -153,7 +153,8 @@ impl<'a> Optimiser<'a> {
         (self.failed, self.idle, self.steps) = (0, 0, 0);
     }
 
-    /// Returns to an earlier state of the phase and begins the descent anew, with all nodes constrained to their isolines.
+    /// Returns to an earlier state of the phase and begins the descent anew, with all nodes constrained to their
+    /// isolines.
     pub(in crate::embed) fn restart_constrained(&mut self, state: State) {
         self.through_arcs.constrain_all();
         if self.distortion.is_some() {
@@ -252,9 +253,9 @@ impl<'a> Optimiser<'a> {
         solver.solve(topology, metric, Some(&self.state.field.angle), kind, progress)
     }
 
-    /// For each triangle of `topology` whether it lies near a vertex that a node has left or come to, where the field turns.
-    /// The field does not turn with an unconstrained regular node, but its isolines do: there it suffices that the node has
-    /// changed position.
+    /// For each triangle of `topology` whether it lies near a vertex that a node has left or come to, where the field
+    /// turns. The field does not turn with an unconstrained regular node, but its isolines do: there it suffices that
+    /// the node has changed position.
     fn turning_triangles(&self, topology: &EmbeddingTopology) -> Vec<bool> {
         let mesh = &topology.mesh;
         let mut near = vec![false; mesh.n_vertices()];

@@ -1,9 +1,9 @@
 //! Placement of regular nodes at the crossings of their isolines.
 //!
-//! While nodes move, regular nodes are not constrained: their through-arcs are, and the node belongs where these cross, inside
-//! some triangle. A corner of that triangle is moved to the crossing, and the coordinates of moved vertices are read off the
-//! present map at their new positions. So the node has the coordinates of the crossing, and constraining it does not change
-//! the map.
+//! While nodes move, regular nodes are not constrained: their through-arcs are, and the node belongs where these cross,
+//! inside some triangle. A corner of that triangle is moved to the crossing, and the coordinates of moved vertices are
+//! read off the present map at their new positions. So the node has the coordinates of the crossing, and constraining
+//! it does not change the map.
 
 use glam::{DVec2, DVec3};
 
@@ -60,8 +60,8 @@ impl Optimiser<'_> {
         Ok(())
     }
 
-    /// The topology with regular nodes at their crossings, but for those that `stays` marks; and the nodes that came onto
-    /// features.
+    /// The topology with regular nodes at their crossings, but for those that `stays` marks; and the nodes that came
+    /// onto features.
     fn with_nodes_at_crossings(&self, stays: &[bool]) -> (EmbeddingTopology, Vec<usize>) {
         let mut topology = self.state.topology.clone();
         let mut on_feature = Vec::new();
@@ -89,7 +89,8 @@ impl Optimiser<'_> {
         (topology, on_feature)
     }
 
-    /// Whether the transferred map flips no triangle around the vertex `from`, which the node has left, and the node's vertex.
+    /// Whether the transferred map flips no triangle around the vertex `from`, which the node has left, and the node's
+    /// vertex.
     fn is_injective_around(&self, moved: &EmbeddingTopology, from: VertexId, node: usize) -> bool {
         let around = |v: VertexId| moved.mesh.outgoing(v).map(|h| moved.mesh.face(h));
         around(from).chain(around(moved.nodes[node].vertex)).all(|f| {
@@ -105,7 +106,8 @@ impl Optimiser<'_> {
         locate(topology, &solution.map, topology.mesh.face(h), target)
     }
 
-    /// The present map on a topology some of whose vertices have moved: the coordinates of the corners of each triangle.
+    /// The present map on a topology some of whose vertices have moved: the coordinates of the corners of each
+    /// triangle.
     fn transfer_map(&self, moved: &EmbeddingTopology) -> Vec<[DVec2; 3]> {
         let mesh = &moved.mesh;
         mesh.faces().map(|f| mesh.face_halfedges(f).map(|h| self.transfer_corner(moved, h))).collect()
@@ -125,7 +127,8 @@ impl Optimiser<'_> {
     }
 }
 
-/// The coordinates of the point nearest to `position` in the triangles around a vertex, and the corner in whose chart they are.
+/// The coordinates of the point nearest to `position` in the triangles around a vertex, and the corner in whose chart
+/// they are.
 fn coordinates_near(
     topology: &EmbeddingTopology,
     map: &SeamlessMap,

@@ -1,9 +1,9 @@
 //! Relocation of nodes on the surface (Campen, section 6.5.1).
 //!
-//! A node must be a vertex, but its position is continuous. So a corner of the triangle that the position lies in is moved
-//! there, the one that moves least, and returns to its rest position once the node leaves it. No vertex is inserted and no
-//! connectivity changes. Positions are projected onto the surface of the problem; a position is refused, and the step halved,
-//! where triangles around it would flip or degenerate.
+//! A node must be a vertex, but its position is continuous. So a corner of the triangle that the position lies in is
+//! moved there, the one that moves least, and returns to its rest position once the node leaves it. No vertex is
+//! inserted and no connectivity changes. Positions are projected onto the surface of the problem; a position is
+//! refused, and the step halved, where triangles around it would flip or degenerate.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -15,9 +15,9 @@ use crate::surface::{Metric, SurfaceIndex, trace_geodesic};
 
 /// Halvings of a step that is not possible before the node stays. Chosen by hand.
 const HALVINGS: usize = 4;
-/// Ratio of a triangle's doubled area to its squared longest side, 0 to √3/2. A triangle must stay above this bound, or above
-/// half its own ratio where it is thinner already: initial embeddings leave slivers along arcs, and a node beside one must
-/// be able to move. Gradients of the map in thinner triangles mean little.
+/// Ratio of a triangle's doubled area to its squared longest side, 0 to √3/2. A triangle must stay above this bound, or
+/// above half its own ratio where it is thinner already: initial embeddings leave slivers along arcs, and a node beside
+/// one must be able to move. Gradients of the map in thinner triangles mean little.
 const MIN_THICKNESS: f64 = 0.02;
 /// Least cosine between the normals of a triangle before and after; 1 would forbid any tilt, 0 allows a right angle.
 const MIN_NORMAL_COSINE: f64 = 0.2;
@@ -64,7 +64,8 @@ pub(super) struct CrossingPoint {
 }
 
 impl SurfaceProjection<'_> {
-    /// Moves a free node along a straightest geodesic, given by the vector `step` of its polar map; returns the length moved.
+    /// Moves a free node along a straightest geodesic, given by the vector `step` of its polar map; returns the length
+    /// moved.
     pub(super) fn move_free(
         &self,
         topology: &mut EmbeddingTopology,
@@ -92,8 +93,8 @@ impl SurfaceProjection<'_> {
         0.0
     }
 
-    /// Whether a node at `position` keeps the least distance from other irregular nodes, or at least comes no closer. Irregular
-    /// nodes close together circle each other and wind up their arcs.
+    /// Whether a node at `position` keeps the least distance from other irregular nodes, or at least comes no closer.
+    /// Irregular nodes close together circle each other and wind up their arcs.
     fn keeps_distance(&self, topology: &EmbeddingTopology, node: usize, position: DVec3) -> bool {
         let old = topology.mesh.position(topology.nodes[node].vertex);
         topology.nodes[node].is_regular()
@@ -104,7 +105,8 @@ impl SurfaceProjection<'_> {
             })
     }
 
-    /// Puts the node at `position` in `face` by one of its corners. Returns whether that is possible; if not, nothing changes.
+    /// Puts the node at `position` in `face` by one of its corners. Returns whether that is possible; if not, nothing
+    /// changes.
     fn put_in_face(
         &self,
         topology: &mut EmbeddingTopology,
@@ -130,8 +132,8 @@ impl SurfaceProjection<'_> {
         false
     }
 
-    /// The topologies with a node put at a crossing by one of the corners of its triangle, in order of how far the corner moves.
-    /// A crossing on an edge for which `is_feature` holds is put there by an end of that edge.
+    /// The topologies with a node put at a crossing by one of the corners of its triangle, in order of how far the
+    /// corner moves. A crossing on an edge for which `is_feature` holds is put there by an end of that edge.
     pub(super) fn put_at<'n>(
         &'n self,
         topology: &'n EmbeddingTopology,
@@ -167,8 +169,8 @@ impl SurfaceProjection<'_> {
         vertices.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     }
 
-    /// Moves a node along a path of edges to the vertex `to`, which is put at `position`. Returns whether the triangles around
-    /// allow that; if not, nothing changes.
+    /// Moves a node along a path of edges to the vertex `to`, which is put at `position`. Returns whether the triangles
+    /// around allow that; if not, nothing changes.
     fn move_to_vertex(
         &self,
         topology: &mut EmbeddingTopology,
@@ -205,8 +207,8 @@ impl SurfaceProjection<'_> {
             .collect()
     }
 
-    /// Moves a node along its curve by `length`, in the sense that agrees most with `direction`; returns the length moved. It
-    /// stops half an edge before a corner or another node.
+    /// Moves a node along its curve by `length`, in the sense that agrees most with `direction`; returns the length
+    /// moved. It stops half an edge before a corner or another node.
     pub(super) fn move_along_curve(
         &self,
         topology: &mut EmbeddingTopology,

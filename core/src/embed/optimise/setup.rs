@@ -1,5 +1,5 @@
-//! What an optimisation derives from the surface of the problem: topology, sharp edges and curvature of the working mesh, and
-//! the freedom of its nodes.
+//! What an optimisation derives from the surface of the problem: topology, sharp edges and curvature of the working
+//! mesh, and the freedom of its nodes.
 
 use std::collections::BTreeSet;
 
@@ -13,8 +13,8 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{TriMesh, VertexId};
 use crate::surface::PrincipalCurvature;
 
-/// Least distance of irregular nodes on the surface, in least lengths of arcs: closer ones circle each other and wind up their
-/// arcs.
+/// Least distance of irregular nodes on the surface, in least lengths of arcs: closer ones circle each other and wind
+/// up their arcs.
 const MIN_NODE_DISTANCE: f64 = 1.5;
 /// Cosine between successive curve edges below which a curve has a corner: half way from straight to a right angle.
 const CORNER_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -98,8 +98,8 @@ fn sharp_edges(surface: &Surface<'_>, topology: &EmbeddingTopology) -> Vec<bool>
         .collect()
 }
 
-/// The surface with the freedom of every node: nodes on curves move along them, and nodes at corners of curves are fixed like
-/// pinned ones.
+/// The surface with the freedom of every node: nodes on curves move along them, and nodes at corners of curves are
+/// fixed like pinned ones.
 pub(super) fn surface_projection<'a>(
     surface: &Surface<'a>,
     topology: &EmbeddingTopology,

@@ -1,8 +1,8 @@
 //! Chord lengths in the map: node spacing (Campen, section 6.9) and whole multiples of an edge length (section 6.7).
 //!
-//! All arcs of a chord have the same length in the map, so one constraint on one arc fixes a chord. A chord shorter than a
-//! least length is fixed at that length: patches stay wide enough to be resolved by triangles, and separatrices keep their
-//! order.
+//! All arcs of a chord have the same length in the map, so one constraint on one arc fixes a chord. A chord shorter
+//! than a least length is fixed at that length: patches stay wide enough to be resolved by triangles, and separatrices
+//! keep their order.
 
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::embed::topology::through_arcs::{ThroughArcs, corner_point};
@@ -89,8 +89,8 @@ pub(in crate::embed) fn chord_lengths(
     found
 }
 
-/// The length of arc `a` in the map, negative where its end nodes have changed places; `None` if the isoline across one of its
-/// ends has no constrained node.
+/// The length of arc `a` in the map, negative where its end nodes have changed places; `None` if the isoline across one
+/// of its ends has no constrained node.
 fn arc_length(topology: &EmbeddingTopology, through_arcs: &ThroughArcs, map: &SeamlessMap, a: u32) -> Option<f64> {
     let chain = through_arcs.length_chain(topology, a)?;
     let at = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];

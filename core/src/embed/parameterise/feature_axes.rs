@@ -1,9 +1,10 @@
-//! The axis of every feature edge: along which direction of the field it runs, hence which coordinate is constant on it.
+//! The axis of every feature edge: along which direction of the field it runs, hence which coordinate is constant on
+//! it.
 //!
-//! Method: a feature line from corner to corner or node to node is assigned its directions as a whole, by dynamic programming
-//! over its edges. The cost of an edge is its squared deviation from the field, weighted by length; every change of direction
-//! along the line has a fixed cost. Single edges cannot decide: beside a node the field turns within a few triangles, and an
-//! edge there may be nearer to the wrong direction.
+//! Method: a feature line from corner to corner or node to node is assigned its directions as a whole, by dynamic
+//! programming over its edges. The cost of an edge is its squared deviation from the field, weighted by length; every
+//! change of direction along the line has a fixed cost. Single edges cannot decide: beside a node the field turns
+//! within a few triangles, and an edge there may be nearer to the wrong direction.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
@@ -14,7 +15,8 @@ use crate::surface::Metric;
 /// Cost of a change of direction along a line, in edges of mean length that run across the field. Measured: 8 left more
 /// feature edges off isolines, 60 as well.
 const CHANGE_COST: f64 = 20.0;
-/// Cosine between the two edges at a vertex above which a feature has a corner there: half way from straight to a right angle.
+/// Cosine between the two edges at a vertex above which a feature has a corner there: half way from straight to a right
+/// angle.
 const CORNER_COSINE: f64 = -FRAC_1_SQRT_2;
 
 /// A feature edge with its direction.
@@ -135,8 +137,8 @@ fn line_directions(
     line.iter().enumerate().map(each).collect()
 }
 
-/// The quarter turns from the frame of the triangle of `a` to that of `b`, around the vertex between both half-edges on their
-/// left side: direction `k` of the first is direction `k − turns` of the second. `None` across the boundary.
+/// The quarter turns from the frame of the triangle of `a` to that of `b`, around the vertex between both half-edges on
+/// their left side: direction `k` of the first is direction `k − turns` of the second. `None` across the boundary.
 fn turns_between(topology: &EmbeddingTopology, a: HalfedgeId, b: HalfedgeId) -> Option<i32> {
     let mesh = &topology.mesh;
     let mut turns = 0;

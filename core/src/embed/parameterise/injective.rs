@@ -1,8 +1,9 @@
 //! The injective map for nodes at given vertices: an initial guess without flipped triangles, then a descent.
 //!
 //! The guess is the map of least squares to given gradients; it satisfies the constraints but may flip triangles. A few
-//! flipped triangles are removed, in this order: by more weight on them, by a constraint homotopy or local confinement, by
-//! untangling. Whatever starts without flipped triangles stays so, since the energy is infinite on them ([`crate::param`]).
+//! flipped triangles are removed, in this order: by more weight on them, by a constraint homotopy or local confinement,
+//! by untangling. Whatever starts without flipped triangles stays so, since the energy is infinite on them
+//! ([`crate::param`]).
 
 use glam::DVec2;
 
@@ -17,12 +18,12 @@ use crate::param::{
 use crate::progress::Progress;
 use crate::surface::Metric;
 
-/// Largest number of flipped triangles of a guess that are worth removing. After a node step there is the alternative of a
-/// shorter step; for a first map there is only a much worse start, so more effort pays.
+/// Largest number of flipped triangles of a guess that are worth removing. After a node step there is the alternative
+/// of a shorter step; for a first map there is only a much worse start, so more effort pays.
 const FEW_AFTER_STEP: usize = 50;
 const FEW_AT_FIRST: usize = 2000;
-/// Rounds of fitting a guess again with more weight on its flipped triangles, and the growth of their weights in each; see
-/// [`stiffen`]. Both chosen by hand.
+/// Rounds of fitting a guess again with more weight on its flipped triangles, and the growth of their weights in each;
+/// see [`stiffen`]. Both chosen by hand.
 const REFITS: usize = 2;
 const REFIT_GROWTH: f64 = 9.0;
 
@@ -31,7 +32,8 @@ const REFIT_GROWTH: f64 = 9.0;
 pub(in crate::embed) enum InitialMap<'s> {
     /// An injective map: the coordinates of the corners of each triangle.
     Injective(&'s [[DVec2; 3]]),
-    /// A map of each triangle up to translations and quarter turns. It need neither satisfy the constraints nor be injective.
+    /// A map of each triangle up to translations and quarter turns. It need neither satisfy the constraints nor be
+    /// injective.
     UpToQuarterTurns(&'s [[DVec2; 3]]),
     /// An injective map of the same topology, which need not satisfy the present constraints.
     InPlace(&'s [[DVec2; 3]]),
@@ -41,8 +43,8 @@ pub(in crate::embed) enum InitialMap<'s> {
         uv: &'s [[DVec2; 3]],
         /// The gradients in the frame of the field before the step.
         gradients: &'s [[f64; 4]],
-        /// Whether each triangle lies at a vertex that a node has left or come to. The field turns there with the node, so that
-        /// the gradients relative to the field are a better guess than the coordinates.
+        /// Whether each triangle lies at a vertex that a node has left or come to. The field turns there with the node,
+        /// so that the gradients relative to the field are a better guess than the coordinates.
         turning: &'s [bool],
     },
 }
@@ -97,7 +99,8 @@ impl MapInputs<'_> {
             let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
             tracing::debug!(flipped = flipped.len(), left = unfolded.folds.len(), "flipped triangles of the guess");
             found = system.injective(&energy, unfolded.y.clone());
-            // Untangling is expensive. After a node step a shorter step is the better way out; a first map has no other.
+            // Untangling is expensive. After a node step a shorter step is the better way out; a first map has no
+            // other.
             if found.is_none() && matches!(initial, InitialMap::Injective(_) | InitialMap::UpToQuarterTurns(_)) {
                 let whole = (&topology.mesh, &quarters[..]);
                 found = system.untangle(&newton, &energy, unfolded.y, whole, progress)?;
@@ -160,13 +163,15 @@ impl MapInputs<'_> {
     }
 }
 
-/// The gradients `∇u` and `∇v` in the frame of the field, rotated by the number of quarter turns that aligns them best with it.
+/// The gradients `∇u` and `∇v` in the frame of the field, rotated by the number of quarter turns that aligns them best
+/// with it.
 fn turned_to_field([a, b, c, d]: [f64; 4]) -> [f64; 4] {
     let turned = [[a, b, c, d], [c, d, -a, -b], [-a, -b, -c, -d], [-c, -d, a, b]];
     turned.into_iter().max_by(|g, h| (g[0] + g[3]).total_cmp(&(h[0] + h[3]))).unwrap_or([a, b, c, d])
 }
 
-/// The angles of the field that a map up to quarter turns follows, on the branch nearest to the initial field of the topology.
+/// The angles of the field that a map up to quarter turns follows, on the branch nearest to the initial field of the
+/// topology.
 pub(super) fn angles_along_map(topology: &EmbeddingTopology, metric: &Metric, uv: &[[DVec2; 3]]) -> Vec<f64> {
     // The rotation part of the 2×2 matrix of the map.
     let rotation = |g: [f64; 4]| {

@@ -1,5 +1,5 @@
-//! Cross field and seamless map for nodes at given vertices: the solves, their constraints, quality measures, and the gradient
-//! of the energy at the nodes.
+//! Cross field and seamless map for nodes at given vertices: the solves, their constraints, quality measures, and the
+//! gradient of the energy at the nodes.
 //!
 //! The room may use `topology`; it does not move nodes. [`solve`] is the entry.
 

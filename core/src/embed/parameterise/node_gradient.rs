@@ -1,9 +1,9 @@
 //! The gradient of the map's energy by the position of a node, estimated (Campen, section 6.6.1).
 //!
 //! The energy depends on a node's position through the shapes of the triangles around it, through the field and through
-//! the map. The estimator freezes field and map; the rest has a closed form over the 1-ring. The ring lies in the plane by the
-//! geodesic polar map. For a triangle `(h, a, b)` of area `A`, with `φ = J(b − a) / 2A` the gradient of the node's hat
-//! function, `J` a rotation by 90° and `W` the matrix of the norm,
+//! the map. The estimator freezes field and map; the rest has a closed form over the 1-ring. The ring lies in the plane
+//! by the geodesic polar map. For a triangle `(h, a, b)` of area `A`, with `φ = J(b − a) / 2A` the gradient of the
+//! node's hat function, `J` a rotation by 90° and `W` the matrix of the norm,
 //!
 //! `∂E/∂h = Σ A [(r_u·W r_u + r_v·W r_v) φ − 2 (φ·W r_u) ∇u − 2 (φ·W r_v) ∇v]`, `r_u = ∇u − u_t`, `r_v = ∇v − v_t`.
 

@@ -5,8 +5,8 @@
 //!
 //! * conformal distortion `E_confor = 1/A ∫ σ₁/σ₂ + σ₂/σ₁`: 2 where angles are preserved, larger where squares become
 //!   rectangles or rhombi;
-//! * conjugacy error `E_planar = 1/√A ∫ |II(∇u/‖∇u‖, ∇v/‖∇v‖)|`: 0 if small quads along the isolines are planar. The absolute
-//!   value is taken, which the thesis does not write: values of opposite sign would cancel;
+//! * conjugacy error `E_planar = 1/√A ∫ |II(∇u/‖∇u‖, ∇v/‖∇v‖)|`: 0 if small quads along the isolines are planar. The
+//!   absolute value is taken, which the thesis does not write: values of opposite sign would cancel;
 //! * alignment error `E°`: the mean angle of ∇u and ∇v to the nearest principal direction, weighted by `(κ₁ − κ₂)²`, in
 //!   degrees: 22.5 for random directions, 45 at most.
 //!
@@ -21,8 +21,8 @@ use crate::param::SeamlessMap;
 use crate::surface::PrincipalCurvature;
 use crate::surface::second_fundamental_form;
 
-/// Bound of the conformal distortion of one triangle: degenerate triangles would make the mean infinite. At 100, where a
-/// square becomes a rectangle of 1 to 100, the map is useless anyway.
+/// Bound of the conformal distortion of one triangle: degenerate triangles would make the mean infinite. At 100, where
+/// a square becomes a rectangle of 1 to 100, the map is useless anyway.
 const MAX_CONFORMAL: f64 = 100.0;
 
 /// The measures of a map of a whole surface. Integrals are over the surface.
@@ -70,8 +70,8 @@ pub struct TriangleMeasure {
     pub flipped: bool,
 }
 
-/// The measures of a seamless map, and those of each triangle. `curvature` holds principal curvatures of the triangles, as
-/// from [`face_curvature`](crate::surface::face_curvature).
+/// The measures of a seamless map, and those of each triangle. `curvature` holds principal curvatures of the triangles,
+/// as from [`face_curvature`](crate::surface::face_curvature).
 pub fn measure_map(
     mesh: &TriMesh,
     map: &SeamlessMap,

@@ -1,7 +1,8 @@
-//! Field and map for nodes at given vertices (Campen, sections 6.3 and 6.4): one linear solve for the guiding field, one for
-//! target lengths, and one for the least-squares map or several for an injective one.
+//! Field and map for nodes at given vertices (Campen, sections 6.3 and 6.4): one linear solve for the guiding field,
+//! one for target lengths, and one for the least-squares map or several for an injective one.
 //!
-//! Constraints of chord lengths and features that contradict the layout are left out, so that the layout is always satisfied.
+//! Constraints of chord lengths and features that contradict the layout are left out, so that the layout is always
+//! satisfied.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -23,13 +24,14 @@ use crate::progress::Progress;
 use crate::solve::{SolveError, SpdSymbolic};
 use crate::surface::{Metric, PrincipalCurvature};
 
-/// Deviation of the field from a principal direction, in quarter turns, up to which the direction has its full penalty weight,
-/// and from which on none: 14° and 32°. Beyond an eighth of a turn another direction of the cross would be meant.
+/// Deviation of the field from a principal direction, in quarter turns, up to which the direction has its full penalty
+/// weight, and from which on none: 14° and 32°. Beyond an eighth of a turn another direction of the cross would be
+/// meant.
 const FULL_AGREEMENT: f64 = 0.15;
 const NO_AGREEMENT: f64 = 0.35;
-/// Penalty weight of the directions of the initial embedding per area, in inverse squared lengths on a surface of bounding-box
-/// diagonal 1. They decide how the field as a whole is turned where nothing else does, and are too weak to decide anything
-/// local.
+/// Penalty weight of the directions of the initial embedding per area, in inverse squared lengths on a surface of
+/// bounding-box diagonal 1. They decide how the field as a whole is turned where nothing else does, and are too weak to
+/// decide anything local.
 const INITIAL_DIRECTIONS: f64 = 0.5;
 /// Rounds of solving for the first field: in each one more principal directions agree with it.
 const FIRST_FIELD_ROUNDS: usize = 4;
@@ -104,8 +106,8 @@ pub(in crate::embed) struct Solver<'s> {
 }
 
 impl Solver<'_> {
-    /// Solves for field and map. Principal directions are compared with the field of the angles `previous`, if given. The
-    /// result is [`Flipped`] if an injective map was asked for and none was found.
+    /// Solves for field and map. Principal directions are compared with the field of the angles `previous`, if given.
+    /// The result is [`Flipped`] if an injective map was asked for and none was found.
     pub(in crate::embed) fn solve(
         &mut self,
         topology: EmbeddingTopology,
@@ -121,8 +123,8 @@ impl Solver<'_> {
             }
             _ => None,
         };
-        // Contradicting directions and features flip triangles of a least-squares map. An injective map follows them as far
-        // as it can, so that all are taken.
+        // Contradicting directions and features flip triangles of a least-squares map. An injective map follows them as
+        // far as it can, so that all are taken.
         let injective = matches!(kind, MapKind::Injective { .. });
         let principal = principal_direction_penalties(mesh, &metric, self.curvature, self.sharp, injective);
         let angle = self.field_angles((&topology, &metric), &principal, previous.or(guessed.as_deref()), progress)?;
@@ -192,8 +194,8 @@ impl Solver<'_> {
                     tracing::debug!(relation, layout = layout.len(), "a constraint contradicts the layout");
                     match relation.checked_sub(layout.len() + lengths.len()) {
                         Some(feature) => drop(features.remove(feature)),
-                        // The error names the constraint eliminated last, which need not be the one to blame. The features
-                        // that deviate most from the field are the likeliest.
+                        // The error names the constraint eliminated last, which need not be the one to blame. The
+                        // features that deviate most from the field are the likeliest.
                         None if !features.is_empty() => features.truncate(features.len() * 3 / 4),
                         None => drop(lengths.pop()),
                     }
@@ -205,8 +207,8 @@ impl Solver<'_> {
         }
     }
 
-    /// The angles of the guiding field. Which principal directions agree with it is not known before the first field, so that
-    /// this is solved for in several rounds.
+    /// The angles of the guiding field. Which principal directions agree with it is not known before the first field,
+    /// so that this is solved for in several rounds.
     fn field_angles(
         &self,
         (topology, metric): (&EmbeddingTopology, &Metric),
@@ -221,8 +223,8 @@ impl Solver<'_> {
             None => (topology.angle.clone(), FIRST_FIELD_ROUNDS),
         };
         for round in 0..rounds {
-            // In the first half of the rounds features turn the field towards them; those that contradict it after that do
-            // not bend it further.
+            // In the first half of the rounds features turn the field towards them; those that contradict it after that
+            // do not bend it further.
             let selective = previous.is_some() || round >= FIRST_FIELD_ROUNDS / 2;
             let keep = |g: &DirectionPenalty| match g.branch {
                 None if selective => weighted_by_agreement(g, angle[g.face.index()]),
@@ -235,8 +237,8 @@ impl Solver<'_> {
         Ok(angle)
     }
 
-    /// Directions that do not depend on the field: those of features, where it is open which direction of the cross follows
-    /// them; those of the boundary, which the layout determines; weakly those of the initial embedding.
+    /// Directions that do not depend on the field: those of features, where it is open which direction of the cross
+    /// follows them; those of the boundary, which the layout determines; weakly those of the initial embedding.
     fn given_directions(&self, topology: &EmbeddingTopology, metric: &Metric) -> Vec<DirectionPenalty> {
         let mesh = &topology.mesh;
         let mut penalties = feature_direction_penalties(mesh, metric, self.sharp);
@@ -270,8 +272,8 @@ fn target_lengths(
 }
 
 /// The share of the anisotropy in each triangle: `(κ₁ − κ₂)²` over the mean of `½ (κ₁² + κ₂²)` on the surface, at most
-/// [`MAX_ANISOTROPY_SHARE`]. It is 0 where curvature is the same in all directions. The alignment measure of section 6.8.1
-/// weighs deviations by the same `(κ₁ − κ₂)²`.
+/// [`MAX_ANISOTROPY_SHARE`]. It is 0 where curvature is the same in all directions. The alignment measure of section
+/// 6.8.1 weighs deviations by the same `(κ₁ − κ₂)²`.
 fn anisotropy_share(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64> {
     let mean_at = |f: FaceId, of: fn(&PrincipalCurvature) -> f64| {
         mesh.face_vertices(f).iter().map(|v| of(&curvature[v.index()])).sum::<f64>() / 3.0
@@ -286,8 +288,8 @@ fn anisotropy_share(mesh: &TriMesh, curvature: &[PrincipalCurvature]) -> Vec<f64
 
 /// A direction penalty weighted by its agreement with the angle of the field; `None` where it does not agree.
 ///
-/// The layout prevails over principal directions. Where both contradict each other, or a direction is taken for its neighbour a
-/// quarter turn away, the field would turn by a quarter within a few triangles and the map would flip.
+/// The layout prevails over principal directions. Where both contradict each other, or a direction is taken for its
+/// neighbour a quarter turn away, the field would turn by a quarter within a few triangles and the map would flip.
 fn weighted_by_agreement(penalty: &DirectionPenalty, angle: f64) -> Option<DirectionPenalty> {
     let off = (penalty.angle - angle) / FRAC_PI_2;
     let off = (off - off.round()).abs();

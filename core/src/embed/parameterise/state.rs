@@ -32,15 +32,15 @@ pub struct State {
 pub struct FeatureEdges {
     /// Number of sharp edges.
     pub total: usize,
-    /// Number of those on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which the
-    /// surface's bounding-box diagonal is 1.
+    /// Number of those on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which
+    /// the surface's bounding-box diagonal is 1.
     pub on_isolines: usize,
     /// The end points of the others.
     pub off_isolines: Vec<[[f64; 3]; 2]>,
 }
 
-/// Ratio of an image's area to its target area at and below which the triangle counts as flipped: so thin it is flat but for
-/// rounding. Chosen by hand.
+/// Ratio of an image's area to its target area at and below which the triangle counts as flipped: so thin it is flat
+/// but for rounding. Chosen by hand.
 const FLAT: f64 = 1e-3;
 /// Coordinates that differ by no more count as equal: rounding on a surface of bounding-box diagonal 1.
 const EQUAL: f64 = 1e-9;
@@ -51,8 +51,8 @@ impl State {
         self.flipped_triangles().iter().filter(|&&f| f).count()
     }
 
-    /// For each triangle whether the map flips it or turns it by more than a right angle away from the field. The latter
-    /// counts because a node of eight quarters can be mapped onto four without any triangle of negative area.
+    /// For each triangle whether the map flips it or turns it by more than a right angle away from the field. The
+    /// latter counts because a node of eight quarters can be mapped onto four without any triangle of negative area.
     pub(in crate::embed) fn flipped_triangles(&self) -> Vec<bool> {
         let errors = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
         let lengths = |f: usize| self.objective.lengths.get(f).copied().unwrap_or([1.0; 2]);
@@ -70,7 +70,8 @@ impl State {
         each.iter().map(|r| r.energy).sum()
     }
 
-    /// The energy of each triangle: that of injective maps with the given weights, or without weights that of least squares.
+    /// The energy of each triangle: that of injective maps with the given weights, or without weights that of least
+    /// squares.
     pub(in crate::embed) fn energies(&self, distortion: Option<DistortionWeights>) -> Vec<f64> {
         let Self { metric, field, objective, anisotropy_share, solution, .. } = self;
         match distortion {

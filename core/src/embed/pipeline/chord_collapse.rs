@@ -1,8 +1,9 @@
 //! The choice of chords to collapse (Campen, section 6.9).
 //!
-//! Collapsing a chord merges the end nodes of each of its arcs. The thesis constrains its length to zero; here the chord is
-//! deleted from the layout. Shortest chords come first. Of chords that meet in a node only one is collapsed at a time, since
-//! lengths in the next map differ there. A collapse that is undone because of its energy is not tried again.
+//! Collapsing a chord merges the end nodes of each of its arcs. The thesis constrains its length to zero; here the
+//! chord is deleted from the layout. Shortest chords come first. Of chords that meet in a node only one is collapsed at
+//! a time, since lengths in the next map differ there. A collapse that is undone because of its energy is not tried
+//! again.
 
 use crate::embed::pipeline::report::{CollapsedChord, UncollapsedChord};
 use crate::embed::problem::Problem;
@@ -33,8 +34,8 @@ impl<'a> ChordCollapse<'a> {
         Self { layout, fixed_nodes, deleted: none.clone(), refused: none, collapsed, uncollapsed }
     }
 
-    /// Collapses at most `most` of the chords `short`, given by index and length; with `only_simpler` only those without which the
-    /// layout is less irregular. Returns the number of chords collapsed.
+    /// Collapses at most `most` of the chords `short`, given by index and length; with `only_simpler` only those
+    /// without which the layout is less irregular. Returns the number of chords collapsed.
     pub(super) fn choose(&mut self, mut short: Vec<(u32, f64)>, most: usize, only_simpler: bool) -> usize {
         short.retain(|&(chord, _)| !self.deleted[chord as usize] && !self.refused[chord as usize]);
         short.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));

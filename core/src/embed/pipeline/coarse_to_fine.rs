@@ -1,8 +1,8 @@
 //! Coarse to fine: the layout of a large mesh is optimised on a small proxy of the mesh first.
 //!
-//! Optimal node positions depend little on triangles much smaller than patches, but the cost of every step is proportional to the
-//! number of triangles. So the layout is transferred to a proxy, optimised there, and transferred back. On the mesh itself
-//! remain a first map, constraining features and nodes, and a few node steps.
+//! Optimal node positions depend little on triangles much smaller than patches, but the cost of every step is
+//! proportional to the number of triangles. So the layout is transferred to a proxy, optimised there, and transferred
+//! back. On the mesh itself remain a first map, constraining features and nodes, and a few node steps.
 
 use std::collections::VecDeque;
 
@@ -27,25 +27,27 @@ use crate::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, nearest_in_
 /// Number of triangles of the proxy: so many in all, or for each patch where that is more. Chosen by hand.
 const PROXY_FACES: usize = 6000;
 const PROXY_FACES_PER_PATCH: usize = 60;
-/// Least ratio of the number of triangles of the mesh to that of the proxy; below it the detour costs more than it saves.
+/// Least ratio of the number of triangles of the mesh to that of the proxy; below it the detour costs more than it
+/// saves.
 const MIN_REDUCTION: usize = 2;
 /// Factor by which the proxy is refined if the layout does not fit on it.
 const PROXY_REFINEMENT: usize = 2;
-/// Fractions of the whole optimisation, begin and end: making the proxy, optimising on it, and optimising on the mesh. The first
-/// half of the last one is skipped, so that its range begins below the end of the second.
+/// Fractions of the whole optimisation, begin and end: making the proxy, optimising on it, and optimising on the mesh.
+/// The first half of the last one is skipped, so that its range begins below the end of the second.
 const SIMPLIFYING: [f64; 2] = [0.0, 0.05];
 const ON_PROXY: [f64; 2] = [0.05, 0.6];
 const ON_MESH: [f64; 2] = [0.2, 1.0];
-/// Largest number of Newton steps of the first map on the mesh. It starts near its minimum, and later solves improve it.
+/// Largest number of Newton steps of the first map on the mesh. It starts near its minimum, and later solves improve
+/// it.
 const FIRST_NEWTON_STEPS: usize = 8;
 /// Penalty weight of features in that map: they lie near isolines already, so that the continuation begins late.
 const FEATURE_PENALTY: f64 = 1e3;
-/// Node steps on the mesh without features. With features there are none: measured, under this penalty no step lowered the
-/// energy.
+/// Node steps on the mesh without features. With features there are none: measured, under this penalty no step lowered
+/// the energy.
 const FINE_STEPS: usize = 1;
 
-/// Embeds a layout and optimises its embedding, on a proxy first where that is worthwhile. `observer` is shown every improvement
-/// and may ask to finish.
+/// Embeds a layout and optimises its embedding, on a proxy first where that is worthwhile. `observer` is shown every
+/// improvement and may ask to finish.
 ///
 /// # Errors
 ///
@@ -188,8 +190,8 @@ impl ProxyTransfer<'_> {
         Ok(carry((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
     }
 
-    /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each triangle takes
-    /// the affine map of the nearest triangle of a patch on the proxy.
+    /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each
+    /// triangle takes the affine map of the nearest triangle of a patch on the proxy.
     fn map_on_mesh(&self, topology: &EmbeddingTopology, maps: &[PatchMap]) -> Vec<[DVec2; 3]> {
         let mut pieces: Vec<Vec<Affine>> = vec![Vec::new(); self.proxy.mesh().n_faces()];
         for map in maps {

@@ -13,12 +13,12 @@ use crate::param::{FlipReason, FlippedTriangle};
 use crate::progress::Progress;
 use crate::surface::face_curvature;
 
-/// Largest length of an isoline that completes a partial layout, in square roots of the surface's area: a bound that only
-/// isolines without an end reach.
+/// Largest length of an isoline that completes a partial layout, in square roots of the surface's area: a bound that
+/// only isolines without an end reach.
 const MAX_ISOLINE_LENGTH: f64 = 100.0;
 
-/// The embedding that a final state defines: traced arcs, or the completed layout where arcs are missing, and the rectangles of
-/// its patches. The report lacks what happened before.
+/// The embedding that a final state defines: traced arcs, or the completed layout where arcs are missing, and the
+/// rectangles of its patches. The report lacks what happened before.
 pub(super) fn extract_embedding(
     problem: &Problem<'_>,
     (state, sharp): (&State, &[bool]),

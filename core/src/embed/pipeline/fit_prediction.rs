@@ -1,8 +1,9 @@
 //! Prediction of how well a layout will fit a surface, before it is embedded.
 //!
-//! For nodes at their initial positions, the guiding field and the least-squares map take linear solves only. The quality
-//! measures of this map are not those of the finished embedding, but nearly in the same order, which suffices to choose between
-//! many layouts, a hundred times as fast. Some node steps bring them closer and show which flipped triangles persist.
+//! For nodes at their initial positions, the guiding field and the least-squares map take linear solves only. The
+//! quality measures of this map are not those of the finished embedding, but nearly in the same order, which suffices
+//! to choose between many layouts, a hundred times as fast. Some node steps bring them closer and show which flipped
+//! triangles persist.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
@@ -14,8 +15,8 @@ use crate::embed::problem::Problem;
 use crate::progress::Progress;
 use crate::surface::face_curvature;
 
-/// Bound of the conformal distortion of one triangle, and the value of a flipped one, which an injective map will squeeze. Few
-/// triangles of finished embeddings have more.
+/// Bound of the conformal distortion of one triangle, and the value of a flipped one, which an injective map will
+/// squeeze. Few triangles of finished embeddings have more.
 const MAX_CONFORMAL: f64 = 4.0;
 
 /// The predicted quality of an embedding.
@@ -24,8 +25,8 @@ pub struct PredictedFit {
     /// Alignment error of the least-squares map in degrees, as
     /// [`Measures::alignment`](crate::embed::Measures::alignment).
     pub alignment: f64,
-    /// Its conformal distortion, as [`Measures::conformal`](crate::embed::Measures::conformal), but with a smaller bound for
-    /// each triangle.
+    /// Its conformal distortion, as [`Measures::conformal`](crate::embed::Measures::conformal), but with a smaller
+    /// bound for each triangle.
     pub conformal: f64,
     /// The share of triangles that are flipped, 0 to 1. Those that persist while nodes move can hardly be removed.
     pub flipped: f64,

@@ -1,7 +1,7 @@
 //! Optimisation on one mesh: the phases, and chord collapse where it is asked for (Campen, section 6.9).
 //!
-//! Short chords are collapsed after the least-squares descent: the layout without them is embedded and its nodes are moved
-//! anew. If the energy rises too much, or the remaining layout cannot be embedded, the collapse is undone.
+//! Short chords are collapsed after the least-squares descent: the layout without them is embedded and its nodes are
+//! moved anew. If the energy rises too much, or the remaining layout cannot be embedded, the collapse is undone.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
@@ -14,8 +14,8 @@ use crate::progress::Progress;
 
 /// Fractions of the whole optimisation at which the least-squares descent is reported to begin and end, 0 to 1.
 const DESCENT_FRACTIONS: (f64, f64) = (0.05, 0.35);
-/// Largest factor by which the energy may grow when chords below the asked length are collapsed: collapsing at any price can
-/// spoil a map. Chosen by hand.
+/// Largest factor by which the energy may grow when chords below the asked length are collapsed: collapsing at any
+/// price can spoil a map. Chosen by hand.
 const ENERGY_GROWTH: f64 = 1.5;
 
 /// Which chords are collapsed.
@@ -97,7 +97,8 @@ fn finish_with_collapse(
                 Err(failure) => Some(failure),
             };
             if failure.is_some() {
-                // Of several chords only one may be to blame: none is excluded, and from now on they are tried one by one.
+                // Of several chords only one may be to blame: none is excluded, and from now on they are tried one by
+                // one.
                 collapse.undo(before, failure.as_deref().filter(|_| count == 1));
                 rule.at_once = 1;
                 reduced = match before {

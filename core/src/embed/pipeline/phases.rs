@@ -1,8 +1,9 @@
-//! The phases of an optimisation on one mesh: least squares, then an injective map; in the end arcs and patches are extracted.
+//! The phases of an optimisation on one mesh: least squares, then an injective map; in the end arcs and patches are
+//! extracted.
 //!
-//! The least-squares phase comes first: its steps are cheap, and it finds where features can be constrained. The injective
-//! phase starts from the least-squares map, with flipped triangles untangled; where that fails it starts from the initial
-//! embedding, and where that fails too the least-squares result is returned with its flipped triangles.
+//! The least-squares phase comes first: its steps are cheap, and it finds where features can be constrained. The
+//! injective phase starts from the least-squares map, with flipped triangles untangled; where that fails it starts from
+//! the initial embedding, and where that fails too the least-squares result is returned with its flipped triangles.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
@@ -103,7 +104,8 @@ impl<'w> Phases<'w> {
         let has_no_flips = |done: &OptimisedEmbedding| done.report.remaining_flips.is_empty();
         let mut done = match found {
             Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            // The least-squares map completes a partial layout. With rounded lengths, nodes that move on would leave the grid.
+            // The least-squares map completes a partial layout. With rounded lengths, nodes that move on would leave
+            // the grid.
             Ok(done) if !complete || (rounded && has_no_flips(&done)) => done,
             found => {
                 let start = Optimiser::from_map_of(problem, optimiser, progress);
@@ -160,9 +162,9 @@ impl<'w> Phases<'w> {
             (self.steps, self.energy_before, self.flipped_before);
     }
 
-    /// Moves the nodes with an injective map. Regular nodes are released for that, since badly placed ones would stop the
-    /// descent early. Constraining them again in the end may fail; then the nodes move once more from the start of the phase
-    /// with all of them constrained, and if that fails too the start itself is the result.
+    /// Moves the nodes with an injective map. Regular nodes are released for that, since badly placed ones would stop
+    /// the descent early. Constraining them again in the end may fail; then the nodes move once more from the start of
+    /// the phase with all of them constrained, and if that fails too the start itself is the result.
     pub(super) fn injective_phase(
         &mut self,
         problem: &Problem<'_>,

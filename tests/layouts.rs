@@ -8,7 +8,7 @@ use glam::DVec3;
 use plait_core::dual::{Mark, RefinedMesh};
 use plait_core::embed::{
     ArcHeadings, EmbeddingError, EmbeddingTopology, Next, OptimisedEmbedding, Optimiser, Problem, Settings, Snapshot,
-    Surface, arc_headings, optimise,
+    Surface, arc_headings, optimise_embedding,
 };
 use plait_core::field::indices;
 use plait_core::layout::{Arc, DualCurve, Embedding, Node, Patch, QuadLayout, carry, map_patches, redraw};
@@ -192,13 +192,13 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     for _ in 0..3 {
         optimiser.step(&Progress::new()).unwrap();
     }
-    optimiser.finish(&Progress::new()).unwrap();
+    optimiser.finalise(&Progress::new()).unwrap();
     let state = optimiser.state();
-    let (mesh, map) = (&state.net.mesh, &state.solution.map);
+    let (mesh, map) = (&state.topology.mesh, &state.solution.map);
     let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
     let mut edges = 0;
     for h in mesh.halfedges().filter(|&h| mesh.twin(h).is_none()) {
-        let (heading, _) = state.net.boundary[&h];
+        let (heading, _) = state.topology.boundary[&h];
         let along = uv(mesh.next(h)) - uv(h);
         let (constant, way) = if heading % 2 == 0 { (along.y, along.x) } else { (along.x, along.y) };
         assert!(constant.abs() < 1e-9, "{constant} across edge of {way}");
@@ -370,11 +370,11 @@ fn a_large_mesh_is_embedded_by_way_of_a_proxy() {
         seen += 1;
         Next::Continue
     };
-    let done = optimise(&job, &progress, &mut on_surface).unwrap();
+    let done = optimise_embedding(&job, &progress, &mut on_surface).unwrap();
     assert!(progress.stage_times().iter().any(|s| s.stage == "Simplifying the mesh"));
     assert!(seen > 1);
     assert_eq!(done.layout, layout);
-    assert!(done.report.folds.is_empty());
+    assert!(done.report.remaining_flips.is_empty());
     is_drawn(&layout, &done.embedding);
     // On a sphere patches of an icosahedron's thirds cannot be without distortion, and need not have more than this.
     assert!(done.report.measures.conformal < 2.12, "{:?}", done.report.measures);
@@ -389,7 +389,7 @@ fn a_proxy_does_not_outlast_a_cancellation() {
         progress.cancel();
         Next::Continue
     };
-    let stopped = optimise(&stage.job(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
+    let stopped = optimise_embedding(&stage.job(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
     assert!(matches!(stopped, Err(EmbeddingError::Cancelled(_))));
 }
 
@@ -406,7 +406,7 @@ fn embedded_on(
 ) -> (QuadLayout, OptimisedEmbedding) {
     let arc_headings = arc_headings(&layout);
     let job = Problem { settings, ..stage.job(&layout, initial_embedding, &arc_headings) };
-    let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+    let done = optimise_embedding(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
     done.layout.check(2).unwrap();
     let sum: i64 = done.layout.nodes.iter().map(|n| 4 - n.valence as i64).sum();
     assert_eq!(sum, 8);
@@ -416,12 +416,12 @@ fn embedded_on(
 #[test]
 fn short_chords_are_collapsed() {
     let (_, plain) = embedded(Settings::default());
-    assert!(plain.report.collapsed.is_empty() && plain.initial_embedding.is_none());
+    assert!(plain.report.collapsed_chords.is_empty() && plain.initial_embedding.is_none());
     let shortest = plain.maps.iter().flat_map(|m| [m.size.x, m.size.y]).fold(f64::INFINITY, f64::min);
     let (given, done) = embedded(Settings { collapse: Some(1.2 * shortest), ..Settings::default() });
     let report = &done.report;
-    assert!(!report.collapsed.is_empty(), "{report:?}");
-    assert_eq!(done.layout.chords, given.chords - report.collapsed.len());
+    assert!(!report.collapsed_chords.is_empty(), "{report:?}");
+    assert_eq!(done.layout.chords, given.chords - report.collapsed_chords.len());
     assert!(done.layout.patches.len() < given.patches.len() && done.initial_embedding.is_some());
     assert!(done.maps.iter().all(|m| m.flipped == 0 && m.size.min_element() > 0.0));
 }
@@ -444,7 +444,7 @@ fn strips_are_left_out_that_only_make_a_layout_irregular() {
     let settings = Settings { simplify: true, ..Settings::default() };
     let (given, done) = embedded_on(&stage, left.layout, &left.embedding, settings);
     assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);
-    assert_eq!(done.layout.chords, given.chords - done.report.collapsed.len());
+    assert_eq!(done.layout.chords, given.chords - done.report.collapsed_chords.len());
 }
 
 #[test]
@@ -464,7 +464,7 @@ fn patches_are_whole_numbers_of_quads() {
         let arc_headings = arc_headings(&drawn.layout);
         let settings = Settings { integer: Some(0.05), steps: 3, ..Settings::default() };
         let job = Problem { settings, ..job_of(&session, &drawn, &arc_headings) };
-        let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+        let done = optimise_embedding(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
         let (_, off) = integer_grid_counts(&done.layout, &done.maps, 0.05);
         assert!(off < 1e-8, "{name}: {off}");
     }

@@ -257,5 +257,5 @@ pub fn optimise(
         pinned_arcs: &pinned.arcs,
         settings: Settings::default(),
     };
-    crate::embed::optimise(&job, progress, watch)
+    crate::embed::optimise_embedding(&job, progress, watch)
 }

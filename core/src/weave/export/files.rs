@@ -184,7 +184,7 @@ pub fn finish(
             };
             let (pinned_nodes, pinned_arcs) = (&pinned.nodes[..], &pinned.arcs[..]);
             let job = Problem { surface, layout, initial_embedding, arc_headings, pinned_nodes, pinned_arcs, settings };
-            Some(embed::optimise(&job, progress, watch))
+            Some(embed::optimise_embedding(&job, progress, watch))
         }
     };
     progress.check()?;

@@ -283,11 +283,22 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
         energy_before: r.energy_before,
         energy_after: r.energy_after,
         flipped_before: r.flipped_before,
-        flipped_at_rest: r.flipped_at_rest,
-        folds: r.folds.iter().map(|f| FoldSection { at: in_file(f.at), reason: f.reason.clone() }).collect(),
-        collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
-        short: r.short.iter().map(|c| UncollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
-        features: FeatureEdges { off: r.features.off.iter().map(|ends| ends.map(in_file)).collect(), ..r.features },
+        flipped_at_rest: r.flipped_after_least_squares,
+        folds: r.remaining_flips.iter().map(|f| FoldSection { at: in_file(f.at), reason: f.reason.clone() }).collect(),
+        collapsed: r
+            .collapsed_chords
+            .iter()
+            .map(|c| CollapsedChord { length: c.length * scale, ..c.clone() })
+            .collect(),
+        short: r
+            .uncollapsed_chords
+            .iter()
+            .map(|c| UncollapsedChord { length: c.length * scale, ..c.clone() })
+            .collect(),
+        features: FeatureEdges {
+            off_isolines: r.features.off_isolines.iter().map(|ends| ends.map(in_file)).collect(),
+            ..r.features
+        },
     });
     let patch = |p: &crate::embed::PatchMeasures| PatchSection {
         aspect: p.aspect,
@@ -307,7 +318,7 @@ fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
 impl Export {
     /// Whether chords of the layout were collapsed.
     pub fn has_collapsed(&self) -> bool {
-        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed.is_empty())
+        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed_chords.is_empty())
     }
 
     /// The measures of the embedding that is written.

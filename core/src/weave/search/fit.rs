@@ -81,14 +81,14 @@ pub(in crate::weave) fn fit(
     let patches = layout.patches.len();
     let objective = foreseen.alignment
         + DISTORTION * (foreseen.conformal - 2.0)
-        + FOLDS * foreseen.folded
+        + FOLDS * foreseen.flipped
         + PATCH * patches as f64
         + QUARTER * f64::from(quarters)
         + EXTREME * f64::from(extreme);
     let fit = Fit {
         alignment: foreseen.alignment,
         conformal: foreseen.conformal,
-        folded: foreseen.folded,
+        folded: foreseen.flipped,
         patches,
         irregular: layout.n_irregular(),
         objective,

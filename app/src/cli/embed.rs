@@ -100,7 +100,7 @@ pub(super) fn summary(export: &Export) -> String {
         ", {} flipped, conformal {:.3}, planar {:.3}, alignment {:.2}°",
         m.flipped, m.conformal, m.planar, m.alignment
     );
-    if let (Some(Ok(_)), Some(b)) = (&export.optimised, export.before.measures) {
+    if let (Some(Ok(_)), Some(b)) = (&export.optimised, export.initial.measures) {
         text += &format!(" (drawn: {:.3}, {:.3}, {:.2}°)", b.conformal, b.planar, b.alignment);
     }
     text

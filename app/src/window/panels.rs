@@ -435,7 +435,7 @@ fn status(app: &PlaitApp, ui: &mut Ui) {
 /// What the strip under the pointer costs, and what smoothing it came to.
 fn proposal_figures(proposal: &Proposal) -> String {
     match proposal.energy {
-        Some(e) => format!("Cost {:.2} · length and bending {:.2}, smoothed {:.2}", proposal.cost, e.found, e.now),
+        Some(e) => format!("Cost {:.2} · length and bending {:.2}, smoothed {:.2}", proposal.cost, e.found, e.relaxed),
         None => format!("Cost {:.2}", proposal.cost),
     }
 }

@@ -199,22 +199,22 @@ impl TriMesh {
     }
 
     /// All vertices in order.
-    pub fn vertices(&self) -> impl DoubleEndedIterator<Item = VertexId> + use<> {
+    pub fn vertices(&self) -> impl DoubleEndedIterator<Item = VertexId> + Clone + use<> {
         (0..self.n_vertices() as u32).map(VertexId)
     }
 
     /// All triangles in order.
-    pub fn faces(&self) -> impl DoubleEndedIterator<Item = FaceId> + use<> {
+    pub fn faces(&self) -> impl DoubleEndedIterator<Item = FaceId> + Clone + use<> {
         (0..self.n_faces() as u32).map(FaceId)
     }
 
     /// All edges in order.
-    pub fn edges(&self) -> impl DoubleEndedIterator<Item = EdgeId> + use<> {
+    pub fn edges(&self) -> impl DoubleEndedIterator<Item = EdgeId> + Clone + use<> {
         (0..self.n_edges() as u32).map(EdgeId)
     }
 
     /// All half-edges in order.
-    pub fn halfedges(&self) -> impl DoubleEndedIterator<Item = HalfedgeId> + use<> {
+    pub fn halfedges(&self) -> impl DoubleEndedIterator<Item = HalfedgeId> + Clone + use<> {
         (0..self.n_halfedges() as u32).map(HalfedgeId)
     }
 

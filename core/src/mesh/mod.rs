@@ -12,6 +12,7 @@ mod repair;
 mod source;
 mod subdivide;
 mod topology;
+mod traversal;
 mod triangulate;
 mod write;
 
@@ -23,4 +24,5 @@ pub use repair::Repair;
 pub use source::{MeshSource, fingerprint};
 pub use subdivide::loop_subdivision;
 pub use topology::{Component, Topology};
+pub use traversal::{BreadthFirst, Dijkstra, DistanceQueue, Element, components, dilate};
 pub use write::{write_mesh_obj, write_obj};

@@ -1,5 +1,6 @@
 //! A checked mesh made ready for geometry processing, and the curves that are drawn on it.
 
+mod barycentric;
 mod curvature;
 mod curve;
 mod index;
@@ -10,6 +11,7 @@ mod relax;
 mod shape_operator;
 mod trace_geodesic;
 
+pub use barycentric::{barycentric, barycentric_inside};
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
 pub use index::SurfaceIndex;

@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 
 use glam::DVec3;
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::{Crossing, SurfaceCurve, VertexPath, geodesic_in};
+use crate::testing::research_mesh;
 
 /// A small generator of numbers that look random (an LCG with the constants of Knuth's MMIX).
 pub struct Random(pub u64);
@@ -195,32 +195,7 @@ pub fn geodesic_polygon(mesh: &TriMesh, waypoints: &[VertexId]) -> SurfaceCurve 
     curve
 }
 
-/// A mesh of the folder of real meshes, of bounding-box diagonal 1; `None` where there is none.
+/// A research mesh; `None` where it is missing.
 pub fn real_mesh(file: &str) -> Option<TriMesh> {
-    let folder = std::env::var_os("PLAIT_MESHES")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/meshes")), PathBuf::from);
-    let text = std::fs::read_to_string(folder.join(file)).ok()?;
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
-    let point = |w: &[&str]| DVec3::from_array([0, 1, 2].map(|i| w[i].parse().unwrap()));
-    let lines = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>());
-    if file.ends_with(".off") {
-        let mut lines = lines.filter(|w| !w.is_empty() && !w[0].starts_with('#')).skip(1);
-        let counts = lines.next()?;
-        for w in lines.by_ref().take(counts[0].parse().ok()?) {
-            positions.push(point(&w));
-        }
-        faces.extend(lines.map(|w| [1, 2, 3].map(|i| w[i].parse().unwrap())));
-    } else {
-        for w in lines.filter(|w| !w.is_empty()) {
-            match w[0] {
-                "v" => positions.push(point(&w[1..])),
-                "f" => faces.push([1, 2, 3].map(|i| w[i].split('/').next().unwrap().parse::<u32>().unwrap() - 1)),
-                _ => {}
-            }
-        }
-    }
-    let low = positions.iter().copied().reduce(DVec3::min)?;
-    let high = positions.iter().copied().reduce(DVec3::max)?;
-    positions.iter_mut().for_each(|p| *p = (*p - low) / (high - low).length());
-    TriMesh::from_faces(positions, &faces).ok()
+    research_mesh(file).map(|loaded| (*loaded.mesh).clone())
 }

@@ -403,7 +403,8 @@ fn an_optimisation_on_a_proxy_is_cancelled() {
         progress.cancel();
         Next::Continue
     };
-    let stopped = optimise_embedding(&prepared.problem(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
+    let stopped =
+        optimise_embedding(&prepared.problem(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
     assert!(matches!(stopped, Err(EmbeddingError::Cancelled(_))));
 }
 

@@ -179,9 +179,10 @@ fn shape_corners(
     }
     let alignment = AlignmentDirections { directions: &directions, weights: &weights, radius: ALIGNMENT_RADIUS };
     match feature_aligned_field(mesh, &metric, Some(alignment), sharp, progress) {
-        Ok(field) => {
-            Ok(cancel_opposite_pairs(mesh, &field.singularities, CORNER_RADIUS).into_iter().map(|s| (s.vertex, s.index)).collect())
-        }
+        Ok(field) => Ok(cancel_opposite_pairs(mesh, &field.singularities, CORNER_RADIUS)
+            .into_iter()
+            .map(|s| (s.vertex, s.index))
+            .collect()),
         Err(error) => {
             progress.check()?;
             tracing::warn!(%error, "no curvature-aligned field: corners of the shape are not assessed");

@@ -77,7 +77,7 @@ fn optimise(
         pinned_arcs: &input.pinned.arcs,
         settings,
     };
-    Some(embed::optimise(&problem, progress, watch))
+    Some(embed::optimise_embedding(&problem, progress, watch))
 }
 
 /// An embedded layout with the maps of its patches.

@@ -331,8 +331,8 @@ fn measures(m: &Measures) -> MeasuresSection {
         conformal: m.conformal,
         planar: m.planar,
         alignment: m.alignment,
-        max_conformal: m.worst,
+        max_conformal: m.max_conformal,
         flipped: m.flipped,
-        clamped: m.capped,
+        clamped: m.clamped,
     }
 }

@@ -55,7 +55,7 @@ pub struct Export {
 impl Export {
     /// Whether chords of the layout were collapsed.
     pub fn has_collapsed(&self) -> bool {
-        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed.is_empty())
+        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed_chords.is_empty())
     }
 
     /// The measures of the embedding.

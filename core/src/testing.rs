@@ -1,4 +1,4 @@
-//! Small meshes and curves that many tests need.
+//! Small meshes and curves for tests.
 
 use std::f64::consts::TAU;
 
@@ -7,8 +7,8 @@ use glam::DVec3;
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
 
-/// A grid of `n` × `m` cells, each of two triangles, closed or open in each direction, mapped by `map` from
-/// fractions of both directions. Cell `(i, j)` holds faces `2 (j n + i)` and the one after.
+/// A grid of `n` × `m` cells of two triangles each, closed or open in each direction; `map` takes the fractions of both
+/// directions to positions. Cell `(i, j)` has faces `2 (j n + i)` and the next one.
 pub(crate) fn grid(n: u32, m: u32, closed: [bool; 2], map: impl Fn(f64, f64) -> DVec3) -> TriMesh {
     let (columns, rows) = (n + u32::from(!closed[0]), m + u32::from(!closed[1]));
     let mut positions = Vec::new();
@@ -42,7 +42,7 @@ pub(crate) fn square(n: u32) -> TriMesh {
     grid(n, n, [false, false], |u, v| DVec3::new(u, v, 0.0))
 }
 
-/// The curve along row `j` of a [`grid`], crossing each edge at fraction `t` of its height.
+/// The curve along row `j` of a [`grid`], at fraction `t` of the row's height.
 pub(crate) fn row(n: u32, j: u32, closed: bool, t: f64) -> SurfaceCurve {
     let mut crossings = Vec::new();
     if !closed {
@@ -56,7 +56,7 @@ pub(crate) fn row(n: u32, j: u32, closed: bool, t: f64) -> SurfaceCurve {
     SurfaceCurve { crossings, closed }
 }
 
-/// The curve along column `i` of a [`grid`] of `n` × `m` cells, at fraction `t` of each edge's width.
+/// The curve along column `i` of a [`grid`] of `n` × `m` cells, at fraction `t` of the column's width.
 pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCurve {
     let mut crossings = Vec::new();
     if !closed {
@@ -70,7 +70,7 @@ pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCur
     SurfaceCurve { crossings, closed }
 }
 
-/// The closed curve along the diagonals of a closed [`grid`] of `n` × `n` cells, between these.
+/// The closed curve parallel to the diagonals of a closed [`grid`] of `n` × `n` cells, beside the main diagonal.
 pub(crate) fn diagonal(n: u32) -> SurfaceCurve {
     let beside = |i: u32| {
         let cell = 2 * (i * n + i);

@@ -105,9 +105,9 @@ impl TriangleSoup {
     /// Six times the volume inside a closed component, as oriented by its first triangle.
     fn volume(&self, component: &[(u32, bool)]) -> f64 {
         let position = |v: u32| self.raw.positions[v as usize];
-        let center = component.first().map_or(DVec3::ZERO, |&(f, _)| position(self.faces[f as usize][0]));
+        let centre = component.first().map_or(DVec3::ZERO, |&(f, _)| position(self.faces[f as usize][0]));
         let signed = component.iter().map(|&(f, turned)| {
-            let [a, b, c] = self.faces[f as usize].map(|v| position(v) - center);
+            let [a, b, c] = self.faces[f as usize].map(|v| position(v) - centre);
             let six = a.dot(b.cross(c));
             if turned { -six } else { six }
         });

@@ -71,7 +71,6 @@ pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<Loade
 
 #[cfg(test)]
 mod tests {
-
     use proptest::prelude::*;
 
     use super::*;

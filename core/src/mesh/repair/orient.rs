@@ -27,7 +27,8 @@ impl TriangleSoup {
             let n = component.len();
             let against = component.iter().filter(|&&(_, turned)| turned).count();
             let volume = if boxes[i].is_some() { self.volume(component) } else { 0.0 };
-            // Whether the orientation of the component's first triangle is the wrong one.
+            // Whether the first triangle is to be reversed: against the majority if the component is open, or may bound a
+            // cavity; else if the volume is negative.
             let flip_first = if volume == 0.0 || (volume < 0.0 || against > 0) && is_enclosed(&boxes, i) {
                 2 * against > n
             } else {

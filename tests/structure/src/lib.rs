@@ -15,10 +15,12 @@ use syn::visit::{self, Visit};
 /// Names of the uses of one file by another.
 pub type Edges = BTreeMap<(PathBuf, PathBuf), BTreeSet<String>>;
 
-/// A function longer than the limit, or any other finding about one place.
+/// A function with its length.
 #[derive(Debug)]
 pub struct Function {
+    /// The file it stands in, relative to the crate's source folder.
     pub file: PathBuf,
+    /// Its name.
     pub name: String,
     /// Lines from `fn` to the closing brace.
     pub lines: usize,
@@ -29,6 +31,7 @@ pub struct Function {
 pub struct Sources {
     /// From the using file to the defining one; paths relative to the crate's source folder.
     pub edges: Edges,
+    /// All functions outside tests.
     pub functions: Vec<Function>,
 }
 
@@ -314,7 +317,9 @@ fn name_of(item: &syn::Item) -> Option<String> {
 /// One circle of files or folders that lie beside each other, with the uses that close it.
 #[derive(Debug)]
 pub struct Circle {
+    /// Files or folders that lie beside each other.
     pub members: Vec<PathBuf>,
+    /// Which file uses what of which, a line each.
     pub uses: Vec<String>,
 }
 

@@ -60,11 +60,12 @@ pub(super) fn summary(export: &Export) -> String {
     if let Some(Ok(report)) = &export.optimised {
         let (before, after) = (report.energy_before, report.energy_after);
         text += &format!(", energy {before:.4} to {after:.4} in {} steps", report.steps);
-        if !report.collapsed.is_empty() {
-            text += &format!(", {} chords collapsed", report.collapsed.len());
+        if !report.collapsed_chords.is_empty() {
+            text += &format!(", {} chords collapsed", report.collapsed_chords.len());
         }
-        if report.features.all > 0 {
-            text += &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.all);
+        if report.features.total > 0 {
+            text +=
+                &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.total);
         }
     }
     let m = export.measures();
@@ -72,7 +73,7 @@ pub(super) fn summary(export: &Export) -> String {
         ", {} flipped triangles, conformal distortion {:.3}, planarity error {:.3}, alignment error {:.2}°",
         m.flipped, m.conformal, m.planar, m.alignment
     );
-    if let (Some(Ok(_)), Some(b)) = (&export.optimised, export.before.measures) {
+    if let (Some(Ok(_)), Some(b)) = (&export.optimised, export.initial.measures) {
         text += &format!(" (initial embedding: {:.3}, {:.3}, {:.2}°)", b.conformal, b.planar, b.alignment);
     }
     text

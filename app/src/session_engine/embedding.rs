@@ -161,11 +161,11 @@ fn optimised_preview(session: &Session, initial: &InitialLayout, embedding: Opti
     if initial.mesh_role == MeshRole::Proxy {
         distortion = model.woven_face_points().iter().map(|p| distortion[p.face.index()]).collect();
     }
-    let flipped = report.folds.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)));
+    let flipped = report.remaining_flips.iter().map(|f| (f.reason.as_str(), DVec3::from_array(f.at)));
     let summary = EmbeddingSummary {
         steps: report.steps,
         energy: [report.energy_before, report.energy_after],
-        flipped: [report.flipped_before, report.folds.len()],
+        flipped: [report.flipped_before, report.remaining_flips.len()],
         conformal: report.measures.conformal,
         alignment: report.measures.alignment,
         planar: report.measures.planar,
@@ -182,7 +182,7 @@ fn optimised_preview(session: &Session, initial: &InitialLayout, embedding: Opti
 /// Number of feature edges on isolines, number of all, and the midpoint of the first that is not on an isoline.
 fn features(edges: &FeatureEdges) -> (usize, usize, Option<DVec3>) {
     let middle = |ends: &[[f64; 3]; 2]| ends.iter().map(|&p| DVec3::from_array(p)).sum::<DVec3>() / 2.0;
-    (edges.on_isolines, edges.all, edges.off.first().map(middle))
+    (edges.on_isolines, edges.total, edges.off_isolines.first().map(middle))
 }
 
 /// One remark for each reason of flipped triangles, with the place of the first.

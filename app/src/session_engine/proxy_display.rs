@@ -54,7 +54,7 @@ impl ProxyDisplay {
         if let Some(map) = &woven.strip_map {
             let visible = |curve: u32| strips.get(curve as usize).is_some_and(|s| s.visible);
             let pattern = |(&f, corners): (&u32, &[u32; 3])| {
-                extended_stripes(map, refined, f, corners.map(|v| proxy.places()[v as usize]), visible)
+                extended_stripes(map, refined, f, corners.map(|v| proxy.image_positions()[v as usize]), visible)
             };
             surface.stripes = piece.par_iter().zip(self.surface.faces.par_iter()).map(pattern).collect();
         }

@@ -45,7 +45,7 @@ fn hint(app: &PlaitApp) -> &'static str {
 fn proposal_cost(proposal: &Proposal) -> String {
     let cost = format!("Elastica cost {:.2}", proposal.cost);
     match proposal.energy {
-        Some(e) => format!("{cost} · elastic energy {:.2}, relaxed {:.2}", e.found, e.now),
+        Some(e) => format!("{cost} · elastic energy {:.2}, relaxed {:.2}", e.found, e.relaxed),
         None => cost,
     }
 }

@@ -164,7 +164,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
             proved.extend(best);
             if let Some(energy) = proposals.first().and_then(|p| p.energy) {
                 before.push(energy.found);
-                after.push(energy.now);
+                after.push(energy.relaxed);
             }
             if start.elapsed() > arguments.limit() {
                 break;

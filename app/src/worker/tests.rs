@@ -1,3 +1,5 @@
+//! Tests of the worker, with an engine whose operations last as long as the test needs.
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;

@@ -4,8 +4,6 @@
 //! proportional to the number of triangles. So the layout is transferred to a proxy, optimised there, and transferred
 //! back. On the mesh itself remain a first map, constraining features and nodes, and a few node steps.
 
-use std::collections::VecDeque;
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -19,7 +17,7 @@ use crate::embed::pipeline::report::{Next, OptimisedEmbedding, Snapshot};
 use crate::embed::problem::{Problem, Settings, Surface};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, carry};
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{BreadthFirst, FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, nearest_in_triangle};
@@ -212,12 +210,14 @@ impl ProxyTransfer<'_> {
         };
         let mut maps: Vec<Option<Affine>> = mesh.faces().collect::<Vec<_>>().into_par_iter().map(found).collect();
         // Triangles of the proxy all of whose pieces are degenerate have no map: take that of a neighbour.
-        let mut queue: VecDeque<FaceId> = mesh.faces().filter(|f| maps[f.index()].is_some()).collect();
-        while let Some(f) = queue.pop_front() {
-            for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|h| mesh.face(h)) {
-                if maps[g.index()].is_none() {
+        let mut search = BreadthFirst::new(mesh.n_faces());
+        for f in mesh.faces().filter(|f| maps[f.index()].is_some()) {
+            search.start(f);
+        }
+        while let Some(f) = search.visit() {
+            for (_, g) in mesh.adjacent_faces(f) {
+                if search.reach(g, ()) {
                     maps[g.index()] = maps[f.index()];
-                    queue.push_back(g);
                 }
             }
         }

@@ -158,16 +158,16 @@ struct ProxyTransfer<'a> {
 impl ProxyTransfer<'_> {
     /// The initial embedding of the problem on the proxy; `None` if there is none.
     fn to_proxy(&self, problem: &Problem<'_>, progress: &Progress) -> Result<Option<Embedding>, EmbeddingError> {
-        let drawn = (problem.layout, problem.initial_embedding, self.fine.n_vertices());
+        let given = (problem.layout, problem.initial_embedding, self.fine.n_vertices());
         let place = |n: usize| {
             let at = surface_point(self.fine, problem.initial_embedding, problem.initial_embedding.nodes[n]);
             Some(self.proxy.to_proxy(self.fine, at).nearest_vertex(self.proxy.mesh()))
         };
-        let carried = |line: &DualCurve| {
+        let transferred = |line: &DualCurve| {
             let found = self.proxy.polyline_to_proxy(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the proxy")).ok()
         };
-        Ok(carry(drawn, self.proxy.mesh(), carried, place, progress)?)
+        Ok(carry(given, self.proxy.mesh(), transferred, place, progress)?)
     }
 
     /// An embedding on the proxy as an initial embedding on the mesh; `None` if there is none.
@@ -181,11 +181,11 @@ impl ProxyTransfer<'_> {
             let at = surface_point(self.proxy.mesh(), embedding, embedding.nodes[n]);
             Some(self.proxy.to_original(self.fine, at).nearest_vertex(self.fine))
         };
-        let carried = |line: &DualCurve| {
+        let transferred = |line: &DualCurve| {
             let found = self.proxy.polyline_to_original(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the mesh")).ok()
         };
-        Ok(carry((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
+        Ok(carry((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, transferred, place, progress)?)
     }
 
     /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each

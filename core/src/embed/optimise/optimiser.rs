@@ -147,7 +147,7 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Begins the descent anew: usual step sizes, and as many steps as at first.
-    pub(in crate::embed) fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.step_factor.fill(1.0);
         (self.failed, self.idle, self.steps) = (0, 0, 0);
     }

@@ -279,7 +279,7 @@ fn strip(mesh: &TriMesh, first: FaceId, crossed: &[HalfedgeId]) -> Vec<FaceId> {
 }
 
 /// A shortest path of edges within a strip of triangles that avoids the boundary and vertices that are `taken`.
-pub(in crate::embed) fn edge_path(
+pub(super) fn edge_path(
     mesh: &TriMesh,
     strip: &[FaceId],
     from: VertexId,

@@ -33,6 +33,9 @@ pub use pipeline::report::{
 };
 pub use problem::{Problem, Settings, Surface};
 pub use topology::embedding_topology::{ArcHeadings, EmbeddingTopology, TopologyArc, TopologyNode, arc_headings};
-pub use trace::arcs::{ArcChain, FlippedTriangles, TraceError, TracedLayout, preview_arcs, trace_arcs};
+pub use trace::arcs::{FlippedTriangles, preview_arcs, trace_arcs};
 pub use trace::completion::{CompletedLayout, CompletionError, complete_layout};
+pub use trace::error::TraceError;
 pub use trace::rectangles::{RectangleError, map_rectangles};
+pub use trace::separatrix_matching::ArcChain;
+pub use trace::traced_layout::TracedLayout;

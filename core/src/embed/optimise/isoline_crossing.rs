@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use glam::DVec2;
 
 use crate::embed::parameterise::chord_lengths::transition;
-use crate::embed::topology::embedding_topology::{EmbeddingTopology, jump_across};
-use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs, around};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs, fan_crossings};
 use crate::mesh::{BreadthFirst, FaceId, HalfedgeId};
 use crate::param::SeamlessMap;
 use crate::surface::Metric;
@@ -55,8 +55,8 @@ pub(super) fn crossing(
     let mut free = [(0.0, 1.0); 2];
     for &end in half_arcs {
         for (chain, node) in through_arcs.continuations(topology, end) {
-            let mut crossed = around(mesh, corner, chain.start)?;
-            let turns: i32 = crossed.iter().map(|&h| jump_across(mesh, &topology.jump, h)).sum();
+            let mut crossed = fan_crossings(mesh, corner, chain.start)?;
+            let turns = topology.turns_along(&crossed);
             let heading = (i32::from(chain.heading) + turns).rem_euclid(4);
             crossed.extend(&chain.crossed);
             let there = transition(mesh, map, &crossed)?.inverse().apply(at(map, chain.end));

@@ -28,7 +28,7 @@ for input in "$@"; do
     start=$(date +%s.%N)
     target/debug/plait weave "$input" "${first[@]}" --no-optimise --out "$out/w" >/dev/null 2>"$out/woven"
     seconds=$(echo "$(date +%s.%N) $start" | awk '{printf "%.0f", $1 - $2}')
-    grep -h 'the layout follows' "$out/woven" | sed "s|^plait:|$name, woven in $seconds s:|" >&2
+    grep -h 'alignment error .* objective' "$out/woven" | sed "s|^plait:|$name, woven in $seconds s:|" >&2
   fi
   rm -rf "${out:?}/e"
   message=$(timeout "${LIMIT:-600}" target/debug/plait embed "$design" --out "$out/e" --quiet 2>&1)

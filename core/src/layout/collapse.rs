@@ -1,71 +1,71 @@
-//! Deleting chords of a layout: poly-chord collapse (Campen, section 6.9).
+//! Poly-chord collapse: deletion of chords of a layout (Campen, section 6.9).
 //!
-//! A chord is the dual strip of arcs that all have one length. Where that is zero the nodes at both ends of each of its
-//! arcs are one, the patches of the strip are gone, and what their other sides were is one arc. Dually, a curve is taken
-//! out of an arrangement: the regions beside it become one region each, its crossings vanish, and the segments of other
-//! curves go on through them. What comes of it is a layout if every merged region is an open disc that touches the
-//! boundary once at most, has enough corners, and every curve left still crosses another.
+//! Setting the length of a chord to zero merges the two nodes of each of its arcs, removes its patches, and merges the
+//! two other sides of each of these patches into one arc. Dually, a curve is removed from an arrangement: the regions
+//! beside it merge, its crossings vanish, and the segments of other curves continue through them. The result is a
+//! layout if every merged region is an open disc that touches the boundary at most once and has an admissible valence,
+//! and every remaining curve still crosses another.
 
 use thiserror::Error;
 
 use super::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::union_find::UnionFind;
 
-/// Valences that a merged node may have inside the surface, unless one of those it is made of has more: two patches at a
-/// node would be folded onto each other, and triangles hardly span seven and more quarters without folds.
-const INNER: std::ops::RangeInclusive<usize> = 3..=6;
-/// The same on the boundary.
-const BOUNDARY: std::ops::RangeInclusive<usize> = 1..=3;
+/// Admissible valences of a merged inner node; more if a node before the merge has more. Two patches at a node would
+/// cover each other, and triangles of usual meshes can hardly span seven or more quarter turns without flips.
+const INNER_VALENCES: std::ops::RangeInclusive<usize> = 3..=6;
+/// Admissible valences of a merged boundary node, likewise.
+const BOUNDARY_VALENCES: std::ops::RangeInclusive<usize> = 1..=3;
 
-/// A layout without some of its chords, and what became of the parts of the one before.
+/// A layout after deletion of chords, with maps from the nodes, arcs, patches and chords before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CollapsedLayout {
-    /// What is left.
+    /// The remaining layout.
     pub layout: QuadLayout,
-    /// For each node before the one that it has become.
+    /// For each node before, the node it is merged into.
     pub nodes: Vec<u32>,
-    /// For each arc before the one that it has become, and whether that runs in its direction; none for arcs of a chord
-    /// that is gone.
+    /// For each arc before, the arc it is merged into and whether both have the same direction; `None` for arcs of
+    /// deleted chords.
     pub arcs: Vec<Option<(u32, bool)>>,
-    /// For each patch before its number, unless it is gone.
+    /// For each patch before, its new index; `None` if it is deleted.
     pub patches: Vec<Option<u32>>,
-    /// For each chord before its number, unless it is gone.
+    /// For each chord before, its new index; `None` if it is deleted.
     pub chords: Vec<Option<u32>>,
 }
 
-/// Why chords cannot be deleted.
+/// Why chords cannot be deleted. The field `nodes` lists the nodes that would merge.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CollapseError {
     /// There is no such chord.
     #[error("there is no chord {0}")]
     Unknown(u32),
-    /// Nodes would be merged along a closed way, or a node with itself.
-    #[error("nodes {} would merge to what is no disc", list(nodes))]
+    /// A merged region would not be a disc: nodes would merge along a closed curve.
+    #[error("nodes {} would merge to a region that is not a disc", list(nodes))]
     NoDisc {
         /// The nodes.
         nodes: Vec<u32>,
     },
-    /// Nodes would be merged that lie on different boundaries, or at different places of one.
-    #[error("nodes {} would bring several places of the boundary together", list(nodes))]
+    /// A merged region would touch the boundary more than once.
+    #[error("nodes {} would merge to a region that touches the boundary more than once", list(nodes))]
     Boundary {
         /// The nodes.
         nodes: Vec<u32>,
     },
-    /// A merged node would have too few or too many patches.
-    #[error("nodes {} would merge to one of valence {valence}", list(nodes))]
+    /// A merged node would have an inadmissible valence.
+    #[error("nodes {} would merge to a node of valence {valence}", list(nodes))]
     Valence {
         /// The nodes.
         nodes: Vec<u32>,
         /// The valence.
         valence: usize,
     },
-    /// A chord that is left would cross no other.
-    #[error("chord {chord} would be crossed by no other")]
+    /// A remaining chord would cross no other.
+    #[error("chord {chord} would cross no other chord")]
     Uncrossed {
         /// The chord.
         chord: u32,
     },
-    /// What is left is no layout, which would be a defect of this module.
+    /// The result is not a layout. This is a defect of this module.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
@@ -84,22 +84,21 @@ impl QuadLayout {
         if chord as usize >= self.chords {
             return Err(CollapseError::Unknown(chord));
         }
-        let mut gone = vec![false; self.chords];
-        gone[chord as usize] = true;
-        self.without(&gone)
+        let mut deleted = vec![false; self.chords];
+        deleted[chord as usize] = true;
+        self.without_chords(&deleted)
     }
 
-    /// This complete layout without those chords that are `gone`, however they cross each other.
+    /// This complete layout without the chords marked in `deleted`, which may cross each other.
     ///
     /// # Errors
     ///
     /// See [`CollapseError`].
-    pub fn without(&self, gone: &[bool]) -> Result<CollapsedLayout, CollapseError> {
-        let is_gone = |arc: u32| gone[self.arcs[arc as usize].chord as usize];
-        let euler = self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64;
-        let (nodes, merged) = self.merged_nodes(&is_gone);
-        self.check_discs(&is_gone, &nodes, &merged)?;
-        let arcs = self.merged_arcs(&is_gone)?;
+    pub fn without_chords(&self, deleted: &[bool]) -> Result<CollapsedLayout, CollapseError> {
+        let is_deleted = |arc: u32| deleted[self.arcs[arc as usize].chord as usize];
+        let (nodes, merged) = self.merged_nodes(&is_deleted);
+        self.check_discs(&is_deleted, &nodes, &merged)?;
+        let arcs = self.merged_arcs(&is_deleted)?;
         let mut list: Vec<Arc> = Vec::new();
         for (a, target) in arcs.iter().enumerate() {
             let Some((arc, forward)) = *target else { continue };
@@ -126,14 +125,14 @@ impl QuadLayout {
             kept.push(Patch { corners, sides });
         }
         let fits = |n: usize| {
-            let usual = if kinds[n].boundary { BOUNDARY } else { INNER };
+            let usual = if kinds[n].boundary { BOUNDARY_VALENCES } else { INNER_VALENCES };
             let most = merged[n].iter().map(|&old| self.nodes[old as usize].valence).fold(*usual.end(), usize::max);
             (*usual.start()..=most).contains(&kinds[n].valence)
         };
         if let Some(bad) = (0..kinds.len()).find(|&n| merged[n].len() > 1 && !fits(n)) {
             return Err(CollapseError::Valence { nodes: merged[bad].clone(), valence: kinds[bad].valence });
         }
-        let layout = Self::new(kinds, list, kept, euler)?;
+        let layout = Self::new(kinds, list, kept, self.euler())?;
         let mut chords = vec![None; self.chords];
         for (a, target) in arcs.iter().enumerate() {
             if let Some((arc, _)) = *target {
@@ -143,10 +142,10 @@ impl QuadLayout {
         Ok(CollapsedLayout { layout, nodes, arcs, patches, chords })
     }
 
-    /// The new number of every node, and the nodes that become each new one.
-    fn merged_nodes(&self, is_gone: &impl Fn(u32) -> bool) -> (Vec<u32>, Vec<Vec<u32>>) {
+    /// The new index of every node, and the nodes merged into each new one.
+    fn merged_nodes(&self, is_deleted: &impl Fn(u32) -> bool) -> (Vec<u32>, Vec<Vec<u32>>) {
         let mut sets = UnionFind::new(self.nodes.len());
-        for (_, arc) in (0..).zip(&self.arcs).filter(|&(a, _)| is_gone(a)) {
+        for (_, arc) in (0..).zip(&self.arcs).filter(|&(a, _)| is_deleted(a)) {
             sets.join(arc.nodes[0], arc.nodes[1]);
         }
         let mut number = vec![u32::MAX; self.nodes.len()];
@@ -163,11 +162,11 @@ impl QuadLayout {
         (number, merged)
     }
 
-    /// Checks that what nodes merge to are open discs that touch the boundary once at most: dually, cells of all
-    /// dimensions add up to one, as do stretches of the boundary less the ends of curves between them.
+    /// Checks that merged regions are open discs that touch the boundary at most once. The Euler characteristic of a
+    /// merged region must be 1, and so must the number of its boundary stretches less the curve ends between them.
     fn check_discs(
         &self,
-        is_gone: &impl Fn(u32) -> bool,
+        is_deleted: &impl Fn(u32) -> bool,
         number: &[u32],
         merged: &[Vec<u32>],
     ) -> Result<(), CollapseError> {
@@ -175,12 +174,12 @@ impl QuadLayout {
         let on_boundary = |n: &&u32| self.nodes[**n as usize].boundary;
         let mut stretches: Vec<i64> = merged.iter().map(|old| old.iter().filter(on_boundary).count() as i64).collect();
         let touches: Vec<bool> = stretches.iter().map(|&s| s > 0).collect();
-        for (_, arc) in (0..).zip(&self.arcs).filter(|&(a, _)| is_gone(a)) {
+        for (_, arc) in (0..).zip(&self.arcs).filter(|&(a, _)| is_deleted(a)) {
             let n = number[arc.nodes[0] as usize] as usize;
             euler[n] -= 1;
             stretches[n] -= i64::from(arc.boundary);
         }
-        for patch in self.patches.iter().filter(|p| p.sides.iter().all(|&(a, _)| is_gone(a))) {
+        for patch in self.patches.iter().filter(|p| p.sides.iter().all(|&(a, _)| is_deleted(a))) {
             euler[number[patch.corners[0] as usize] as usize] += 1;
         }
         for (n, nodes) in merged.iter().enumerate() {
@@ -194,34 +193,34 @@ impl QuadLayout {
         Ok(())
     }
 
-    /// For every arc that is not gone the new one, and whether that runs in its direction: the two sides that a patch
-    /// loses between them are one. Every new arc must be the side of a patch that is left.
-    fn merged_arcs(&self, is_gone: &impl Fn(u32) -> bool) -> Result<Vec<Option<(u32, bool)>>, CollapseError> {
+    /// For every remaining arc the new arc and whether both have the same direction: opposite sides of a patch merge if
+    /// the sides between them are deleted. Every new arc must be a side of a remaining patch.
+    fn merged_arcs(&self, is_deleted: &impl Fn(u32) -> bool) -> Result<Vec<Option<(u32, bool)>>, CollapseError> {
         let mut beside: Vec<Vec<(u32, bool)>> = vec![Vec::new(); self.arcs.len()];
-        let mut bears = vec![false; self.arcs.len()];
+        let mut is_side_of_patch = vec![false; self.arcs.len()];
         for patch in &self.patches {
             for i in 0..2 {
                 let ((a, f), (b, g)) = (patch.sides[i], patch.sides[i + 2]);
-                let across = is_gone(patch.sides[i + 1].0);
-                if !is_gone(a) && across {
-                    // Opposite sides of a patch are passed in opposite directions.
+                let across = is_deleted(patch.sides[i + 1].0);
+                if !is_deleted(a) && across {
+                    // Opposite sides of a patch run in opposite directions.
                     beside[a as usize].push((b, f != g));
                     beside[b as usize].push((a, f != g));
-                } else if !is_gone(a) {
-                    (bears[a as usize], bears[b as usize]) = (true, true);
+                } else if !is_deleted(a) {
+                    (is_side_of_patch[a as usize], is_side_of_patch[b as usize]) = (true, true);
                 }
             }
         }
         let mut target: Vec<Option<(u32, bool)>> = vec![None; self.arcs.len()];
         let mut count = 0;
         for first in 0..self.arcs.len() as u32 {
-            if is_gone(first) || target[first as usize].is_some() {
+            if is_deleted(first) || target[first as usize].is_some() {
                 continue;
             }
             target[first as usize] = Some((count, true));
-            let (mut stack, mut borne) = (vec![(first, true)], false);
+            let (mut stack, mut is_side) = (vec![(first, true)], false);
             while let Some((a, forward)) = stack.pop() {
-                borne |= bears[a as usize];
+                is_side |= is_side_of_patch[a as usize];
                 for &(b, same) in &beside[a as usize] {
                     if target[b as usize].is_none() {
                         target[b as usize] = Some((count, forward == same));
@@ -229,7 +228,7 @@ impl QuadLayout {
                     }
                 }
             }
-            if !borne {
+            if !is_side {
                 return Err(CollapseError::Uncrossed { chord: self.arcs[first as usize].chord });
             }
             count += 1;

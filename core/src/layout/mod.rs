@@ -1,34 +1,55 @@
-//! Quad layouts: their structure, read off an arrangement of dual curves, and a first embedding.
+//! Quad layouts: structure, embedding on a surface, and files.
 //!
-//! Data flows [`structure`] → [`embed`] (nodes and arcs on the surface) → [`patch`] (each patch mapped to a
-//! rectangle). A [`file`] holds the structure and a rough embedding, complete or not. [`collapse`] deletes chords of a
-//! layout, [`redraw`] draws what is left, [`carry`] draws a layout on another mesh of the surface. The room knows arrangements, not how their curves came about.
+//! - [`structure`]: nodes, arcs, patches and chords; dual to an arrangement of loops.
+//! - [`initial_embedding`]: nodes as vertices and arcs as edge paths on a refinement of the surface.
+//! - [`patch_map`]: maps of the embedded patches to rectangles.
+//! - [`collapse`] deletes chords; [`reembedding`] embeds the remaining layout; [`transfer`] moves an embedded layout to
+//!   another mesh of the surface, by the curves dual to its chords.
+//! - [`file`](mod@file): layouts, complete or partial, with a rough embedding, as files.
+//!
+//! Dependencies: `mesh`, `surface`, `dual`, `solve` and `progress`. The module takes arrangements as given.
 
-mod carry;
 mod collapse;
-mod disc;
-mod dual;
+mod disc_map;
+mod dual_curves;
+mod embedding;
 mod file;
 mod initial_embedding;
-mod matching;
-mod patch;
-mod piece;
-mod redraw;
+mod isomorphism;
+mod patch_disc;
+mod patch_map;
+mod reembedding;
 mod structure;
+mod submesh;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
-pub use carry::carry;
 pub use collapse::{CollapseError, CollapsedLayout};
-pub(crate) use disc::flipped;
-pub use dual::DualCurve;
+pub use dual_curves::{DualCurve, DualCurvesError};
+pub use embedding::Embedding;
+#[cfg(test)]
+pub(crate) use file::testing as file_testing;
 pub use file::{
-    ArcEnd, FileArc, FileNode, LayoutFile, LayoutFileError, Part, PartialCorner, PartialEmbedding,
+    ArcEnd, FileArc, FileNode, LayoutElement, LayoutFile, LayoutFileError, PartialCorner, PartialEmbedding,
     PartialEmbeddingError, PartialRegion, PathPoint,
 };
-pub use initial_embedding::{Embedding, InitialEmbeddingError, embed};
-pub(crate) use patch::{ArcLookup, patch_faces, patch_sides};
-pub use patch::{PatchError, PatchMap, map_patches};
-pub(crate) use piece::Submesh;
-pub use redraw::{Reembedded, ReembeddingError, redraw};
+pub use initial_embedding::{InitialEmbeddingError, initial_embedding};
+pub(crate) use patch_disc::ArcLookup;
+pub use patch_disc::PatchShapeError;
+pub use patch_map::{PatchError, PatchMap, map_patches};
+pub use reembedding::{Reembedded, ReembeddingError, reembed};
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};
+pub use transfer::transfer_embedding;
+
+// Former names, until all callers use the present ones.
+pub use file::LayoutElement as Part;
+pub use initial_embedding::initial_embedding as embed;
+pub use reembedding::reembed as redraw;
+pub use transfer::transfer_embedding as carry;
+pub(crate) use {
+    disc_map::count_flipped as flipped,
+    patch_disc::{patch_faces, patch_sides},
+    submesh::Submesh,
+};
+mod compat;

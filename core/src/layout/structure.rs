@@ -1,7 +1,8 @@
-//! The structure of a quad layout (Campen, sections 2.1 and 5.2.3).
+//! The structure of a quad layout: nodes, arcs, patches and chords (Campen, sections 2.1 and 5.2.3).
 //!
-//! Dual to an arrangement: a node per region, an arc per segment, a patch per crossing. A segment that ends
-//! on the boundary separates two regions whose nodes lie on the boundary, and its arc runs along it.
+//! A layout is dual to an arrangement of loops: it has one node per region, one arc per segment and one patch per
+//! crossing. A segment that ends on the boundary separates two regions with nodes on the boundary, and its arc runs
+//! along the boundary.
 
 use serde::Serialize;
 use thiserror::Error;
@@ -19,7 +20,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Whether four patches meet here, or two on the boundary.
+    /// Whether its valence is 4, or 2 on the boundary.
     pub fn is_regular(&self) -> bool {
         self.valence == if self.boundary { 2 } else { 4 }
     }
@@ -28,11 +29,12 @@ impl Node {
 /// An arc, dual to the segment of the same index.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Arc {
-    /// Its two nodes: of the region to the left of the segment and of the one to the right.
+    /// Its two nodes, dual to the regions left and right of the segment.
     pub nodes: [u32; 2],
     /// Whether it runs along the boundary of the surface.
     pub boundary: bool,
-    /// The dual strip (class of opposite arcs) it belongs to; opposite arcs have equal length in every map.
+    /// Its chord: the class of arcs joined by being opposite in a patch. All arcs of a chord have equal length in a
+    /// map.
     pub chord: u32,
 }
 
@@ -41,21 +43,22 @@ pub struct Arc {
 pub struct Patch {
     /// Its four corners, counter-clockwise.
     pub corners: [u32; 4],
-    /// Its four sides as arc and "in the arc's direction"; side `i` joins corner `i` to corner `i + 1`.
+    /// Its four sides: the arc, and whether the side runs in the direction of the arc. Side `i` joins corner `i` to
+    /// corner `i + 1`.
     pub sides: [(u32, bool); 4],
 }
 
-/// Why an arrangement has no dual quad layout, or a layout is not valid.
+/// Why an arrangement has no dual layout, or a layout is invalid.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LayoutError {
-    /// Regions that are no nodes.
+    /// Regions that cannot be nodes.
     #[error("{} of the regions cannot be nodes yet (the first is region {})", .0.len(), .0[0])]
     RedRegions(Vec<u32>),
-    /// There is no strip crossing at all.
-    #[error("no two strips cross: the layout has no patch")]
+    /// The arrangement has no crossing.
+    #[error("no two loops cross: the layout has no patch")]
     Empty,
-    /// Nodes, arcs and patches do not add up.
-    #[error("{nodes} nodes, {arcs} arcs and {patches} patches make an Euler characteristic of {found}, not {expected}")]
+    /// The Euler characteristic differs from that of the surface.
+    #[error("{nodes} nodes, {arcs} arcs and {patches} patches have Euler characteristic {found} instead of {expected}")]
     Euler {
         /// Number of nodes.
         nodes: usize,
@@ -63,9 +66,9 @@ pub enum LayoutError {
         arcs: usize,
         /// Number of patches.
         patches: usize,
-        /// Their alternating sum.
+        /// The Euler characteristic of the layout.
         found: i64,
-        /// That of the surface.
+        /// The Euler characteristic of the surface.
         expected: i64,
     },
     /// The sides of a patch do not join its corners.
@@ -75,13 +78,13 @@ pub enum LayoutError {
         patch: usize,
     },
     /// A node's valence differs from the number of patch corners there.
-    #[error("node {node} has valence {valence}, but {corners} patch corners")]
+    #[error("node {node} has valence {valence} but {corners} patch corners")]
     Valence {
         /// The node.
         node: usize,
-        /// The valence noted.
+        /// Its valence.
         valence: usize,
-        /// The corners found.
+        /// The number of patch corners there.
         corners: usize,
     },
 }
@@ -95,17 +98,18 @@ pub struct QuadLayout {
     pub arcs: Vec<Arc>,
     /// The patches.
     pub patches: Vec<Patch>,
-    /// Number of chords (dual strips).
+    /// Number of chords.
     pub chords: usize,
 }
 
 impl QuadLayout {
-    /// The layout dual to `arrangement`, whose `red` regions are given, on a surface of Euler characteristic
-    /// `euler`.
+    /// The layout dual to `arrangement` on a surface of Euler characteristic `euler`. `red` lists the regions that
+    /// cannot be nodes.
     ///
     /// # Errors
     ///
-    /// [`LayoutError::RedRegions`] while there are any; anything else is a defect of the arrangement.
+    /// [`LayoutError::RedRegions`] if `red` is not empty, [`LayoutError::Empty`] without crossings. Other errors are
+    /// defects of the arrangement.
     pub fn dual(arrangement: &Arrangement, red: &[u32], euler: i64) -> Result<Self, LayoutError> {
         if !red.is_empty() {
             return Err(LayoutError::RedRegions(red.to_vec()));
@@ -136,7 +140,7 @@ impl QuadLayout {
             for (i, side) in sides.iter_mut().enumerate() {
                 let spoke = crossing.spokes[(i + 1) % 4];
                 let (segment, forward) = arrangement.segment_at(spoke).ok_or(LayoutError::Patch { patch: p })?;
-                // Counter-clockwise around the crossing one passes from the right of the spoke to its left.
+                // Counter-clockwise around the crossing, the side passes from the right of the spoke to its left.
                 *side = (segment, !forward);
             }
             patches.push(Patch { corners, sides });
@@ -144,7 +148,7 @@ impl QuadLayout {
         Self::new(nodes, arcs, patches, euler)
     }
 
-    /// The layout of these parts, on a surface of Euler characteristic `euler`; the chords are found here.
+    /// The layout of given nodes, arcs and patches on a surface of Euler characteristic `euler`; computes the chords.
     ///
     /// # Errors
     ///
@@ -156,7 +160,7 @@ impl QuadLayout {
         Ok(layout)
     }
 
-    /// Numbers the classes of opposite arcs.
+    /// Numbers the chords.
     pub(crate) fn find_chords(&mut self) {
         let mut sets = UnionFind::new(self.arcs.len());
         for p in &self.patches {
@@ -175,7 +179,8 @@ impl QuadLayout {
         }
     }
 
-    /// Checks the layout: every side joins its corners, valences agree, `|N| − |A| + |P| = χ`.
+    /// Checks that every side joins its corners, that valences equal numbers of corners, and that `|N| − |A| + |P| =
+    /// χ`.
     ///
     /// # Errors
     ///
@@ -206,13 +211,13 @@ impl QuadLayout {
         Ok(())
     }
 
-    /// Its Euler characteristic, that of its surface.
+    /// The Euler characteristic `|N| − |A| + |P|`.
     pub fn euler(&self) -> i64 {
         self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64
     }
 
-    /// The least numbers of quads across the chords with which a refinement is a mesh: no arc is cut short to join a node
-    /// to itself, no two join the same nodes, and no patch has a node at two corners.
+    /// For each chord the least number of quads across it with which the subdivided layout is a polygonal mesh without
+    /// loops, double edges and quads that have a vertex twice.
     pub fn min_quads_per_chord(&self) -> Vec<u32> {
         let mut least = vec![1; self.chords];
         let mut raise = |arc: u32, to: u32| {
@@ -236,7 +241,7 @@ impl QuadLayout {
         least
     }
 
-    /// How irregular it is: the sum of what the valences of its nodes are off.
+    /// The sum over all nodes of the difference between the valence and that of a regular node.
     pub fn irregularity(&self) -> usize {
         self.nodes.iter().map(|n| n.valence.abs_diff(if n.boundary { 2 } else { 4 })).sum()
     }

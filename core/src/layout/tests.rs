@@ -1,14 +1,20 @@
-//! Deleting chords of layouts made from triangle meshes, and drawing what is left.
+//! Collapse of chords of layouts made from triangle meshes, and re-embedding of the remaining layout.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+use proptest::prelude::*;
 
 use super::structure::{Arc, Node, Patch};
 use super::*;
 use crate::dual::{Arrangement, Mark, RefinedMesh};
-use crate::mesh::TriMesh;
+use crate::mesh::{HalfedgeId, TriMesh};
 use crate::progress::Progress;
+use crate::surface::{Crossing, SurfaceCurve};
 use crate::testing::{column, grid, row, square, torus};
 
-/// The layout that parts every triangle of a mesh into three patches around its middle, drawn on the mesh of the sixths of
-/// the triangles: all arcs are single edges, all patches two triangles.
+/// The layout with three patches per triangle around its centre, embedded on the mesh with each triangle divided into
+/// six: all arcs are single edges, all patches two triangles.
 fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
     let (v, e) = (mesh.n_vertices() as u32, mesh.n_edges() as u32);
     let middle = |h| v + mesh.edge(h).0;
@@ -29,7 +35,7 @@ fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
     for f in mesh.faces() {
         let sides = mesh.face_halfedges(f);
         let centre = v + e + f.0;
-        positions.push(mesh.face_vertices(f).iter().map(|&v| mesh.position(v)).sum::<glam::DVec3>() / 3.0);
+        positions.push(mesh.face_vertices(f).iter().map(|&v| mesh.position(v)).sum::<DVec3>() / 3.0);
         let first = arcs.len() as u32;
         arcs.extend(sides.map(|h| Arc { nodes: [middle(h), centre], boundary: false, chord: 0 }));
         for i in 0..3 {
@@ -53,7 +59,7 @@ fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
         let h = refined.find(arc.nodes[0], arc.nodes[1]).unwrap();
         refined.set_mark(h, Mark::Arc(a as u32));
     }
-    let drawing = Embedding {
+    let embedding = Embedding {
         base_face: (0..sixths.n_faces() as u32).collect(),
         nodes: (0..nodes.len() as u32).collect(),
         arc_parameters: vec![vec![0.0, 1.0]; arcs.len()],
@@ -61,13 +67,13 @@ fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
         mesh: refined,
         seeds,
     };
-    (QuadLayout::new(nodes, arcs, patches, mesh.euler_characteristic()).unwrap(), drawing)
+    (QuadLayout::new(nodes, arcs, patches, mesh.euler_characteristic()).unwrap(), embedding)
 }
 
 fn surfaces() -> Vec<TriMesh> {
     let open = grid(4, 3, [true, false], |u, v| {
         let a = std::f64::consts::TAU * u;
-        glam::DVec3::new(a.cos(), a.sin(), v)
+        DVec3::new(a.cos(), a.sin(), v)
     });
     let two = crate::field::samples::cells(
         &[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0], [0, 2, 0], [1, 2, 0], [2, 2, 0]],
@@ -83,7 +89,7 @@ fn index_sum(layout: &QuadLayout) -> i64 {
 
 #[test]
 fn collapsing_keeps_layouts_valid_and_the_sum_of_indices() {
-    let (mut done, mut refused) = (0, std::collections::BTreeSet::new());
+    let (mut done, mut refused) = (0, BTreeSet::new());
     for (mesh, seed) in surfaces().iter().flat_map(|m| (0..12u64).map(move |s| (m, s))) {
         let (mut layout, _) = thirds(mesh);
         let (euler, sum) = (mesh.euler_characteristic(), index_sum(&layout));
@@ -119,19 +125,19 @@ fn collapsing_keeps_layouts_valid_and_the_sum_of_indices() {
         }
     }
     assert!(done > 200, "{done}");
-    // No disc, several places of the boundary, two patches at a node.
-    for word in ["disc", "together", "2"] {
+    // No disc; more than one contact with the boundary; two patches at a node.
+    for word in ["disc", "once", "2"] {
         assert!(refused.contains(word), "{refused:?}");
     }
 }
 
 #[test]
-fn a_single_patch_keeps_its_chords() {
+fn chords_of_a_single_patch_are_kept() {
     let mesh = square(8);
     let arrangement = Arrangement::new(&mesh, &[row(8, 2, false, 0.5), column(8, 8, 3, false, 0.5)]).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 1).unwrap();
     assert_eq!(layout.collapse(0), Err(CollapseError::Uncrossed { chord: 1 }));
-    // In two patches side by side the chord along both is needed, one of the chords across is not; its arcs join corners
+    // Two patches side by side: the chord along both must stay; one of the chords across can go. Its arcs join corners
     // of the boundary to regular nodes, which become corners.
     let curves = [row(8, 2, false, 0.5), column(8, 8, 2, false, 0.5), column(8, 8, 5, false, 0.5)];
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
@@ -157,17 +163,17 @@ fn merged_nodes_add_their_valences() {
     assert_eq!(layout.collapse(99), Err(CollapseError::Unknown(99)));
 }
 
-/// Checks the drawing of what is left: patches are discs of four sides that cover the surface.
-fn checked(mesh: &TriMesh, redrawn: &Reembedded) {
-    redrawn.layout.check(mesh.euler_characteristic()).unwrap();
-    let maps = map_patches(&redrawn.layout, &redrawn.embedding, &Progress::new()).unwrap();
+/// Checks a re-embedded layout: its patches are discs with four sides that cover the surface.
+fn check_embedding(mesh: &TriMesh, reembedded: &Reembedded) {
+    reembedded.layout.check(mesh.euler_characteristic()).unwrap();
+    let maps = map_patches(&reembedded.layout, &reembedded.embedding, &Progress::new()).unwrap();
     let area = |m: &TriMesh| m.faces().map(|f| m.face_area(f)).sum::<f64>();
     let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
     assert!((parts - area(mesh)).abs() < 1e-9 * parts, "{parts} of {}", area(mesh));
-    // Faces of the drawing lie in the triangles that they say.
-    let refined = redrawn.embedding.mesh.to_mesh().unwrap();
+    // Faces of the embedding lie in their triangles of the surface.
+    let refined = reembedded.embedding.mesh.to_mesh().unwrap();
     for f in refined.faces() {
-        let base = crate::mesh::FaceId(redrawn.embedding.base_face[f.index()]);
+        let base = crate::mesh::FaceId(reembedded.embedding.base_face[f.index()]);
         let off = refined.face_vertices(f).map(|v| {
             let at = refined.position(v) - mesh.position(mesh.face_vertices(base)[0]);
             at.dot(mesh.face_normal(base)).abs()
@@ -177,25 +183,28 @@ fn checked(mesh: &TriMesh, redrawn: &Reembedded) {
 }
 
 #[test]
-fn what_is_left_is_drawn_whatever_the_surface() {
+fn collapsed_layouts_are_reembedded_on_all_surfaces() {
     let mut drawn = 0;
     for mesh in surfaces() {
-        let (layout, drawing) = thirds(&mesh);
-        let sixths = drawing.mesh.to_mesh().unwrap();
+        let (layout, embedding) = thirds(&mesh);
+        let sixths = embedding.mesh.to_mesh().unwrap();
         let n = sixths.n_vertices();
-        let mut gone = vec![false; layout.chords];
+        let mut deleted = vec![false; layout.chords];
         for chord in 0..layout.chords {
-            gone[chord] = true;
-            let Ok(collapsed) = layout.without(&gone) else {
-                gone[chord] = false;
+            deleted[chord] = true;
+            let Ok(collapsed) = layout.without_chords(&deleted) else {
+                deleted[chord] = false;
                 continue;
             };
-            let redrawn = redraw(&layout, &drawing, &gone, |_| false, n, &Progress::new()).unwrap();
-            checked(&sixths, &redrawn);
-            assert_eq!(redrawn.layout.patches.len(), collapsed.layout.patches.len());
+            let reembedded = reembed(&layout, &embedding, &deleted, |_| false, n, &Progress::new()).unwrap();
+            check_embedding(&sixths, &reembedded);
+            assert_eq!(reembedded.layout.patches.len(), collapsed.layout.patches.len());
             let kinds =
                 |list: &[u32], nodes: &[Node]| list.iter().map(|&n| nodes[n as usize].clone()).collect::<Vec<_>>();
-            assert_eq!(kinds(&redrawn.nodes, &redrawn.layout.nodes), kinds(&collapsed.nodes, &collapsed.layout.nodes));
+            assert_eq!(
+                kinds(&reembedded.nodes, &reembedded.layout.nodes),
+                kinds(&collapsed.nodes, &collapsed.layout.nodes)
+            );
             drawn += 1;
         }
     }
@@ -203,37 +212,135 @@ fn what_is_left_is_drawn_whatever_the_surface() {
 }
 
 #[test]
-fn loops_on_a_torus_are_taken_out_until_two_are_left() {
+fn loops_on_a_torus_are_deleted_until_two_remain() {
     let mesh = torus(24, 12);
     let curves: Vec<_> = (0..3).flat_map(|k| [row(24, 4 * k, true, 0.4), column(24, 12, 7 * k, true, 0.6)]).collect();
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-    let drawing = embed(&arrangement, &layout, &[None; 9], &Progress::new()).unwrap();
+    let embedding = initial_embedding(&arrangement, &layout, &[None; 9], &Progress::new()).unwrap();
     assert_eq!((layout.chords, layout.patches.len()), (6, 9));
-    // A chord is the row or the column that its arcs cross.
+    // A chord is dual to a row or a column.
     let is_row = |chord: usize| {
         let arc = layout.arcs.iter().position(|a| a.chord as usize == chord).unwrap();
         arrangement.segments[arc].curve.is_multiple_of(2)
     };
-    let mut gone = vec![false; 6];
+    let mut deleted = vec![false; 6];
     let mut left = [3, 3];
     for chord in 0..6 {
-        gone[chord] = true;
+        deleted[chord] = true;
         let of = &mut left[usize::from(is_row(chord))];
         if *of == 1 {
             assert!(matches!(
-                layout.without(&gone),
+                layout.without_chords(&deleted),
                 Err(CollapseError::NoDisc { .. } | CollapseError::Uncrossed { .. })
             ));
-            gone[chord] = false;
+            deleted[chord] = false;
             continue;
         }
         *of -= 1;
-        let redrawn = redraw(&layout, &drawing, &gone, |n| n == 0, mesh.n_vertices(), &Progress::new()).unwrap();
-        checked(&mesh, &redrawn);
-        assert_eq!(redrawn.layout.patches.len(), left[0] * left[1]);
-        let kept = redrawn.embedding.nodes[redrawn.nodes[0] as usize];
-        assert_eq!(redrawn.embedding.mesh.positions[kept as usize], drawing.mesh.positions[drawing.nodes[0] as usize]);
+        let reembedded =
+            reembed(&layout, &embedding, &deleted, |n| n == 0, mesh.n_vertices(), &Progress::new()).unwrap();
+        check_embedding(&mesh, &reembedded);
+        assert_eq!(reembedded.layout.patches.len(), left[0] * left[1]);
+        let kept = reembedded.embedding.nodes[reembedded.nodes[0] as usize];
+        assert_eq!(
+            reembedded.embedding.mesh.positions[kept as usize],
+            embedding.mesh.positions[embedding.nodes[0] as usize]
+        );
     }
     assert_eq!(left, [1, 1]);
+}
+
+/// The section of a star-shaped mesh around the origin with the plane through the origin of given normal.
+fn plane_section(mesh: &TriMesh, normal: DVec3) -> SurfaceCurve {
+    let height = |v| normal.dot(mesh.position(v));
+    let rises = |&h: &HalfedgeId| height(mesh.origin(h)) < 0.0 && height(mesh.target(h)) >= 0.0;
+    let start = mesh.halfedges().find(rises).unwrap();
+    let (mut crossings, mut h) = (Vec::new(), start);
+    loop {
+        let (low, high) = (height(mesh.origin(h)), height(mesh.target(h)));
+        crossings.push(Crossing { halfedge: h, t: low / (low - high) });
+        // The section enters the triangle across a falling half-edge and leaves it across the rising one.
+        let entered = mesh.face(mesh.twin(h).unwrap());
+        h = mesh.face_halfedges(entered).into_iter().find(rises).unwrap();
+        if h == start {
+            return SurfaceCurve { crossings, closed: true };
+        }
+    }
+}
+
+/// Checks the structure of a layout dual to `curves` closed curves on a surface of Euler characteristic `euler`.
+fn check_structure(layout: &QuadLayout, arrangement: &Arrangement, curves: usize, euler: i64) {
+    layout.check(euler).unwrap();
+    assert_eq!(layout.nodes.len() as i64 - layout.arcs.len() as i64 + layout.patches.len() as i64, euler);
+    assert_eq!(layout.arcs.len(), 2 * layout.patches.len());
+    // Chords correspond to curves.
+    assert_eq!(layout.chords, curves);
+    let chord_of: BTreeSet<(u32, u32)> =
+        layout.arcs.iter().zip(&arrangement.segments).map(|(arc, segment)| (arc.chord, segment.curve)).collect();
+    assert_eq!(chord_of.len(), curves);
+    // Every arc is a side of two patches, in opposite directions.
+    let mut beside = vec![[None; 2]; layout.arcs.len()];
+    for (p, patch) in layout.patches.iter().enumerate() {
+        for (i, &(arc, forward)) in patch.sides.iter().enumerate() {
+            assert_eq!(beside[arc as usize][usize::from(forward)].replace((p, i)), None);
+        }
+    }
+    // From arc to opposite arc, every chord is one cycle through all of its arcs.
+    for chord in 0..layout.chords as u32 {
+        let of_chord = |a: &usize| layout.arcs[*a].chord == chord;
+        let first = (0..layout.arcs.len()).find(of_chord).unwrap();
+        let (mut arc, mut forward, mut length) = (first, true, 0);
+        loop {
+            let (p, i) = beside[arc][usize::from(forward)].unwrap();
+            // Opposite sides run in opposite directions around the patch; the next patch lies beyond.
+            let (next, along) = layout.patches[p].sides[(i + 2) % 4];
+            (arc, forward, length) = (next as usize, !along, length + 1);
+            if arc == first {
+                break;
+            }
+        }
+        assert_eq!(length, (0..layout.arcs.len()).filter(of_chord).count());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_grids_on_a_torus_have_consistent_structure(
+        rows in prop::collection::btree_map(0..12u32, 0.1..0.9f64, 1..4),
+        columns in prop::collection::btree_map(0..24u32, 0.1..0.9f64, 1..4),
+    ) {
+        let mesh = torus(24, 12);
+        let rows_of = rows.iter().map(|(&j, &t)| row(24, j, true, t));
+        let curves: Vec<SurfaceCurve> =
+            rows_of.chain(columns.iter().map(|(&i, &t)| column(24, 12, i, true, t))).collect();
+        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
+        let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
+        check_structure(&layout, &arrangement, curves.len(), 0);
+        prop_assert_eq!(layout.patches.len(), rows.len() * columns.len());
+        prop_assert!(layout.nodes.iter().all(Node::is_regular));
+    }
+
+    #[test]
+    fn random_great_circles_on_a_sphere_have_consistent_structure(
+        normals in prop::collection::vec((0.0..std::f64::consts::TAU, -0.95..0.95f64), 2..6),
+    ) {
+        let mesh = crate::field::samples::octasphere(6);
+        let normal = |&(angle, z): &(f64, f64)| {
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * angle.cos(), r * angle.sin(), z)
+        };
+        let normals: Vec<DVec3> = normals.iter().map(normal).collect();
+        // Nearly equal planes or planes through vertices are no arrangement in general position.
+        let apart = |a: &DVec3, b: &DVec3| a.cross(*b).length() > 0.1;
+        prop_assume!((0..normals.len()).all(|i| normals[..i].iter().all(|n| apart(n, &normals[i]))));
+        prop_assume!(normals.iter().all(|n| mesh.positions().iter().all(|p| n.dot(*p).abs() > 1e-6)));
+        let curves: Vec<SurfaceCurve> = normals.iter().map(|&n| plane_section(&mesh, n)).collect();
+        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
+        let layout = QuadLayout::dual(&arrangement, &[], 2).unwrap();
+        check_structure(&layout, &arrangement, curves.len(), 2);
+        prop_assert_eq!(layout.patches.len(), curves.len() * (curves.len() - 1));
+    }
 }

@@ -1,39 +1,43 @@
-//! Assembling matrices whose variables are expressions of others: worked out once, added up as often as wanted.
+//! Assembly of matrices whose variables are affine expressions of free variables.
+//!
+//! Where each entry of a small matrix goes in the large one, and with which factor, is computed once. Each assembly is
+//! then one pass over the small matrices.
 
 use super::constraints;
-use super::cut::Cut;
+use super::cut_graph::CutGraph;
 use super::objective::PAIRS;
 use crate::mesh::HalfedgeId;
 use crate::solve::{Reduction, SparseHermitian};
 
-/// Where the entries of small symmetric matrices go in a large one.
+/// Where the entries of small symmetric matrices go in a large one, and with which factors.
 #[derive(Debug, Clone)]
 pub(super) struct Scatter {
-    /// The large matrix without values.
+    /// The pattern of the large matrix, with values of zero.
     pub zero: SparseHermitian<f64>,
-    /// Of each small matrix, the first of its shares; and their number.
+    /// For each small matrix its first contribution, followed by their total number.
     start: Vec<u32>,
-    shares: Vec<Share>,
+    contributions: Vec<Contribution>,
 }
 
-/// One entry of a small matrix times a factor, to be added to one of the large.
+/// One entry of a small matrix times a factor, added to one entry of the large matrix.
 #[derive(Debug, Clone, Copy)]
-struct Share {
+struct Contribution {
     slot: u32,
     entry: u32,
     factor: f64,
 }
 
-/// Shares being collected.
+/// Contributions being collected.
 struct Collector {
     at: Vec<(u32, u32)>,
     start: Vec<u32>,
-    shares: Vec<Share>,
+    contributions: Vec<Contribution>,
 }
 
 impl Scatter {
-    /// For the triangles' shares: pairs of corners as in [`PAIRS`], of u and then of v.
-    pub fn of_triangles(cut: &Cut, reduction: &Reduction) -> Self {
+    /// For matrices of triangles in which u and v are not coupled: pairs of corners as in [`PAIRS`], of u and then of
+    /// v.
+    pub fn of_triangles(cut: &CutGraph, reduction: &Reduction) -> Self {
         let n_faces = cut.turn.len();
         let mut out = Collector::new(13 * n_faces);
         for f in 0..n_faces {
@@ -52,8 +56,8 @@ impl Scatter {
         out.finish(reduction.n_free())
     }
 
-    /// For the triangles' whole shares: the lower triangle, row by row, of u and then v of the corners.
-    pub fn of_whole_triangles(cut: &Cut, reduction: &Reduction) -> Self {
+    /// For full 6 × 6 matrices of triangles: the lower triangle, row by row, of u and then v of the corners.
+    pub fn of_coupled_triangles(cut: &CutGraph, reduction: &Reduction) -> Self {
         let n_faces = cut.turn.len();
         let mut out = Collector::new(23 * n_faces);
         for f in 0..n_faces {
@@ -71,7 +75,7 @@ impl Scatter {
         out.finish(reduction.n_free())
     }
 
-    /// For the single entries of a matrix, of which each variable is expressed by `reduction`.
+    /// For the single entries of a matrix whose variables are expressed by `reduction`.
     pub fn of_matrix(matrix: &SparseHermitian<f64>, reduction: &Reduction) -> Self {
         let mut out = Collector::new(5 * matrix.n());
         for (r, c, _) in matrix.entries() {
@@ -86,41 +90,41 @@ impl Scatter {
     #[inline]
     pub fn add(&self, k: usize, entries: &[f64], matrix: &mut SparseHermitian<f64>) {
         let values = matrix.values_mut();
-        for share in &self.shares[self.start[k] as usize..self.start[k + 1] as usize] {
-            values[share.slot as usize] += share.factor * entries[share.entry as usize];
+        for contribution in &self.contributions[self.start[k] as usize..self.start[k + 1] as usize] {
+            values[contribution.slot as usize] += contribution.factor * entries[contribution.entry as usize];
         }
     }
 }
 
 impl Collector {
     fn new(expected: usize) -> Self {
-        Self { at: Vec::with_capacity(expected), start: vec![0], shares: Vec::with_capacity(expected) }
+        Self { at: Vec::with_capacity(expected), start: vec![0], contributions: Vec::with_capacity(expected) }
     }
 
-    /// An entry that couples two expressions times `factor`, or an expression with itself.
+    /// Adds the contributions of an entry that couples two expressions, or an expression with itself, times `factor`.
     fn expand(&mut self, entry: u32, row: &[(u32, f64)], column: &[(u32, f64)], same: bool, factor: f64) {
         for (a, &(x, c)) in row.iter().enumerate() {
-            // An expression with itself meets each pair of variables twice, of which one is stored; of two
-            // expressions, one variable meets itself twice.
+            // An expression times itself has each pair of variables twice; the matrix stores one of them. In the
+            // product of two expressions, a variable times itself counts twice.
             let from = if same { a } else { 0 };
             for &(y, d) in &column[from..] {
                 let twice = if !same && x == y { 2.0 } else { 1.0 };
                 self.at.push((x, y));
-                self.shares.push(Share { slot: 0, entry, factor: twice * factor * c * d });
+                self.contributions.push(Contribution { slot: 0, entry, factor: twice * factor * c * d });
             }
         }
     }
 
     /// Ends a small matrix.
     fn close(&mut self) {
-        self.start.push(self.shares.len() as u32);
+        self.start.push(self.contributions.len() as u32);
     }
 
     fn finish(mut self, n: usize) -> Scatter {
         let (zero, slot) = SparseHermitian::zero(n, self.at.len(), || self.at.iter().copied());
-        for (share, slot) in self.shares.iter_mut().zip(slot) {
-            share.slot = slot;
+        for (contribution, slot) in self.contributions.iter_mut().zip(slot) {
+            contribution.slot = slot;
         }
-        Scatter { zero, start: self.start, shares: self.shares }
+        Scatter { zero, start: self.start, contributions: self.contributions }
     }
 }

@@ -1,12 +1,12 @@
-//! The linear equalities of a seamless map.
+//! The linear equality constraints of a seamless map.
 //!
-//! Variables are the coordinates of each wedge in combed charts, `2 w` and `2 w + 1` of wedge `w`, and then the
-//! translation of each cut path likewise. Across a cut with period jump `p` from left to right
-//! `w_right = i^{-p} w_left + T`. A relation is carried along its chain: only where that crosses a cut coordinates
-//! change, by turns that are whole and translations that are sums of those of the cuts.
+//! The variables are the coordinates of each wedge in combed charts, `2 w` and `2 w + 1` for wedge `w`, followed by
+//! the translation of each cut path in the same layout. Across a cut with period jump `p` from left to right,
+//! `w_right = i^{-p} w_left + T` (Campen, equation 6.2). A coordinate constraint is transported along its chain of
+//! triangles. Combed charts change only at cuts, so its terms are wedge coordinates and translations with signs.
 
 use super::ParamError;
-use super::cut::Cut;
+use super::cut_graph::CutGraph;
 use super::seamless::CoordinateConstraint;
 use crate::field::Step;
 use crate::mesh::{HalfedgeId, TriMesh};
@@ -26,26 +26,28 @@ pub(super) fn turned(quarters: i32, c: u32) -> (u32, f64) {
 }
 
 /// The variable and sign of a coordinate of the origin of `h` in the field's frame of its triangle.
-pub(super) fn corner(cut: &Cut, h: HalfedgeId, axis: u32) -> (u32, f64) {
+pub(super) fn corner(cut: &CutGraph, h: HalfedgeId, axis: u32) -> (u32, f64) {
     let (component, sign) = turned(cut.turn[h.index() / 3], axis);
     (2 * cut.wedge[h.index()] + component, sign)
 }
 
-/// How much each variable is worth keeping: translations, as each serves a whole path, rather than coordinates.
-pub(super) fn keep(cut: &Cut) -> Vec<u32> {
+/// Priority of each variable to remain free in the elimination: translations, which serve a whole path, before
+/// coordinates.
+pub(super) fn keep(cut: &CutGraph) -> Vec<u32> {
     let mut keep = vec![1; 2 * cut.n_wedges];
     keep.extend(cut.paths.iter().flat_map(|p| [p.steps.len() as u32 + 2; 2]));
     keep
 }
 
-/// `w_right − i^{-p} w_left − T = 0` at every vertex of every cut, and the origin at a corner of each component.
-pub(super) fn seams(mesh: &TriMesh, cut: &Cut) -> Vec<Constraint> {
+/// Seam constraints: `w_right − i^{-p} w_left − T = 0` at every vertex of every cut; one corner of each component is
+/// fixed at the origin.
+pub(super) fn seams(mesh: &TriMesh, cut: &CutGraph) -> Vec<Constraint> {
     let mut out = Vec::new();
     for (k, path) in cut.paths.iter().enumerate() {
         let translation = (2 * (cut.n_wedges + k)) as u32;
         for (i, step) in path.steps.iter().enumerate() {
             let (Some(l), Some(r)) = (step.left(mesh), step.right(mesh)) else { continue };
-            // The corners at the start of the edge, and at the end of the last edge too.
+            // The corners at the start of the edge; at the last edge also those at its end.
             let last = (i + 1 == path.steps.len()).then(|| (mesh.next(l), r));
             for (l, r) in std::iter::once((l, mesh.next(r))).chain(last) {
                 let (l, r) = (2 * cut.wedge[l.index()], 2 * cut.wedge[r.index()]);
@@ -64,8 +66,8 @@ pub(super) fn seams(mesh: &TriMesh, cut: &Cut) -> Vec<Constraint> {
     out
 }
 
-/// Enters the translations of the cuts that follow from the coordinates of the wedges.
-pub(super) fn add_translations(mesh: &TriMesh, cut: &Cut, values: &mut [f64]) {
+/// Computes the translations of the cuts from the coordinates of the wedges.
+pub(super) fn add_translations(mesh: &TriMesh, cut: &CutGraph, values: &mut [f64]) {
     for (k, path) in cut.paths.iter().enumerate() {
         let sides = |s: &Step| Some((s.left(mesh)?, mesh.next(s.right(mesh)?)));
         let Some((l, r)) = path.steps.first().and_then(sides) else { continue };
@@ -78,24 +80,25 @@ pub(super) fn add_translations(mesh: &TriMesh, cut: &Cut, values: &mut [f64]) {
     }
 }
 
-/// The relations as constraints.
-pub(super) fn relations(
+/// Coordinate constraints as linear equalities of the variables.
+pub(super) fn linear_constraints(
     mesh: &TriMesh,
-    cut: &Cut,
+    cut: &CutGraph,
     list: &[CoordinateConstraint],
 ) -> Result<Vec<Constraint>, ParamError> {
-    let one = |(i, r)| relation(mesh, cut, r).ok_or(ParamError::Malformed { relation: i });
+    let one = |(i, c)| linear_constraint(mesh, cut, c).ok_or(ParamError::Malformed { constraint: i });
     list.iter().enumerate().map(one).collect()
 }
 
-/// A relation as a constraint; `None` if it is malformed.
-fn relation(mesh: &TriMesh, cut: &Cut, relation: &CoordinateConstraint) -> Option<Constraint> {
-    let CoordinateConstraint { from, crossed, to, axis, difference } = relation;
-    let fine = |p: &SurfacePoint| p.face.index() < mesh.n_faces() && p.weights.iter().all(|w| w.is_finite());
-    if *axis > 1 || !difference.is_finite() || !fine(from) || !fine(to) {
+/// A coordinate constraint as a linear equality; `None` if it is malformed.
+fn linear_constraint(mesh: &TriMesh, cut: &CutGraph, constraint: &CoordinateConstraint) -> Option<Constraint> {
+    let CoordinateConstraint { from, crossed, to, axis, difference } = constraint;
+    let is_valid = |p: &SurfacePoint| p.face.index() < mesh.n_faces() && p.weights.iter().all(|w| w.is_finite());
+    if *axis > 1 || !difference.is_finite() || !is_valid(from) || !is_valid(to) {
         return None;
     }
-    // Coordinates in the combed chart reached are `i^{-turned} w + Σ sign i^quarters T_path`.
+    // Coordinates in the combed chart reached: `i^{-quarters} w + Σ sign i^{more} T_path`, `shifts` being `(path, more,
+    // sign)`.
     let mut quarters = 0;
     let mut shifts: Vec<(usize, i32, f64)> = Vec::new();
     let mut face = from.face;
@@ -119,7 +122,7 @@ fn relation(mesh: &TriMesh, cut: &Cut, relation: &CoordinateConstraint) -> Optio
     if face != to.face {
         return None;
     }
-    // In the field's frame of the first triangle: `i^turn (i^turned (w_to − shifts) − w_from)`.
+    // In the field's frame of the first triangle: `i^turn (i^quarters (w_to − shifts) − w_from)`.
     let (turn, axis) = (cut.turn[from.face.index()], u32::from(*axis));
     let mut terms = Vec::with_capacity(4);
     let mut add = |variable: u32, quarters: i32, factor: f64| {

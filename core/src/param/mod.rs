@@ -1,79 +1,93 @@
-//! Seamless maps of surfaces to the plane: two coordinates per triangle corner that continue across every edge up
-//! to quarter turns and translations, made to follow a cross field and to satisfy linear relations exactly.
+//! Seamless maps of surfaces to the plane.
 //!
-//! The room may use `mesh`, `surface`, `field`, `solve` and `progress`; it does not know what the maps are for.
+//! A seamless map gives every triangle corner two coordinates. Across an edge the coordinates change by a transition:
+//! a number of quarter turns and a translation (Campen, section 6.4; Bommes, section 6.4). The map follows a cross
+//! field in the least-squares sense ([`Objective`]) or minimises an energy that is infinite for flipped triangles
+//! ([`InjectiveEnergy`]); linear constraints on coordinates ([`CoordinateConstraint`]) hold exactly in both.
+//! [`SeamlessSystem`] sets up and solves; [`remove_flips`] repairs flipped triangles of a least-squares map.
+//!
+//! Dependencies: `mesh`, `surface`, `field`, `solve` and `progress`. The module knows nothing of layouts.
 
 mod assembly;
+mod compat;
 mod constraints;
-mod cut;
+mod cut_graph;
+mod flip_removal;
 mod injective;
+mod newton_system;
 mod objective;
 mod seamless;
-mod solve;
+mod seamless_system;
+mod stiffening;
 #[cfg(test)]
 mod tests;
-mod unfold;
 
 use thiserror::Error;
 
-pub use cut::{Cut, CutPath};
+pub use cut_graph::{CutGraph, CutPath};
+pub use flip_removal::{
+    Effort, FlipReason, FlipRemoval, FlippedTriangle, OrientationProblem, OrientedTriangle, remove_flips,
+};
 pub(crate) use injective::EnergyDensity;
-pub use injective::{DistortionWeights, InjectiveEnergy, InjectiveMap, NewtonSystem, folds, gradients};
+pub use injective::{
+    DistortionWeights, InjectiveEnergy, InjectiveMap, flipped_triangles, flipped_triangles as folds, gradients,
+};
+pub use newton_system::NewtonSystem;
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{CoordinateConstraint, SeamlessMap, Transition, turn};
-pub use solve::{Coordinate, SeamlessSystem, Solution};
-pub use unfold::{Effort, FlipReason, FlippedTriangle, OrientationProblem, OrientedTriangle, Unfolded, unfold};
+pub use seamless_system::{Coordinate, SeamlessSystem, Solution};
+pub use stiffening::Stiffening;
 
 use crate::mesh::EdgeId;
 use crate::progress::Cancelled;
 use crate::solve::{EliminationError, SolveError};
 
-/// Why there is no seamless map.
+/// Why a seamless map could not be set up or solved.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ParamError {
-    /// An array has not one entry per element of the mesh.
+    /// An array does not have one entry per element of the mesh.
     #[error("{what} has {got} entries instead of {want}")]
     WrongLength {
         /// The array.
         what: &'static str,
         /// Its length.
         got: usize,
-        /// The right length.
+        /// The expected length.
         want: usize,
     },
-    /// The field is singular where no node is.
-    #[error("the cross field cannot be combed across {edge:?}")]
+    /// The cross field has a singularity at a vertex that is not in the list of nodes.
+    #[error("the cross field has a singularity near {edge:?} that is not a node")]
     Topology {
-        /// An edge nearby.
+        /// An edge near the singularity.
         edge: EdgeId,
     },
-    /// The field has other period jumps than the system was made for.
-    #[error("the period jump of {edge:?} has changed")]
+    /// A period jump of the field differs from that of the field the system was set up for.
+    #[error("the period jump of {edge:?} differs from that of the system")]
     OtherJump {
         /// The edge.
         edge: EdgeId,
     },
-    /// The chain of a relation does not lead from its first point to its last, or it has a number out of range.
-    #[error("relation {relation} is malformed")]
+    /// The chain of a constraint does not lead from its first point to its last, or a number is out of range.
+    #[error("constraint {constraint} is malformed")]
     Malformed {
         /// Its position in the list.
-        relation: usize,
+        constraint: usize,
     },
-    /// A relation contradicts the others.
-    #[error("relation {relation} contradicts the others (by {rest:e})")]
+    /// A constraint contradicts the others.
+    #[error("constraint {relation} contradicts the others (residual {residual:e})")]
     Conflict {
         /// Its position in the list.
         relation: usize,
-        /// The difference that remains.
-        rest: f64,
+        /// The coordinate difference that remains.
+        residual: f64,
     },
-    /// The cuts could not be eliminated.
+    /// The seam constraints could not be eliminated.
     #[error(transparent)]
     Elimination(#[from] EliminationError),
-    /// The map could not be solved for.
+    /// The linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// The work was cancelled.
+    /// Cancelled from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -1,19 +1,20 @@
-//! Checks of seamless maps on shapes whose maps are known.
+//! Seamless maps on shapes whose maps are known, and properties of their transitions.
 
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
+use proptest::prelude::*;
 
 use super::*;
 use crate::field::samples::*;
 use crate::field::{CrossField, cross_field, feature_aligned_field, indices};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::Metric;
 use crate::surface::SurfacePoint;
 use crate::testing::square;
 
-/// The field that takes in each triangle the given direction, with the smallest jumps.
+/// The field with a given direction in each triangle and the smallest period jumps.
 fn along(mesh: &TriMesh, metric: &Metric, direction: impl Fn(FaceId) -> DVec3) -> CrossField {
     let angle: Vec<f64> = mesh.faces().map(|f| metric.angle_of(mesh, f, direction(f)).unwrap()).collect();
     let jump = |e| {
@@ -27,7 +28,7 @@ fn along(mesh: &TriMesh, metric: &Metric, direction: impl Fn(FaceId) -> DVec3) -
     cross_field(mesh, metric, &angle, &jumps)
 }
 
-/// The field along the edges of a lattice, different directions first in different triangles.
+/// The field along the edges of a lattice; the first direction differs between triangles.
 fn lattice(mesh: &TriMesh, metric: &Metric) -> CrossField {
     along(mesh, metric, |f| {
         let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|a| if f.0 % 3 == 0 { -a } else { a });
@@ -45,7 +46,7 @@ fn solved(system: &mut SeamlessSystem, metric: &Metric, field: &CrossField) -> S
     system.solve(metric, field, &Objective::default(), &Progress::new()).unwrap()
 }
 
-/// Both ends of every edge go over by one transition, of the turns that the jumps tell.
+/// Checks that one transition maps both ends of every edge.
 fn check_seamless(mesh: &TriMesh, map: &SeamlessMap) {
     for h in mesh.halfedges() {
         let (Some(across), Some(t)) = (map.transition(mesh, h), mesh.twin(h)) else { continue };
@@ -55,41 +56,27 @@ fn check_seamless(mesh: &TriMesh, map: &SeamlessMap) {
     }
 }
 
-/// How far a map is from a relation.
-fn miss(mesh: &TriMesh, map: &SeamlessMap, r: &CoordinateConstraint) -> f64 {
+/// The residual of a constraint.
+fn residual(mesh: &TriMesh, map: &SeamlessMap, r: &CoordinateConstraint) -> f64 {
     let at = |p: &SurfacePoint| (0..3).map(|i| map.uv[p.face.index()][i] * p.weights[i]).sum::<DVec2>();
     let chain = r.crossed.iter().fold(Transition::IDENTITY, |t, &h| t.then(&map.transition(mesh, h).unwrap()));
     (chain.inverse().apply(at(&r.to)) - at(&r.from))[usize::from(r.axis)] - r.difference
 }
 
-/// A shortest chain of half-edges crossed between two triangles.
+/// A shortest chain of crossed half-edges between two triangles.
 fn chain(mesh: &TriMesh, from: FaceId, to: FaceId) -> Vec<HalfedgeId> {
-    let mut by: Vec<Option<HalfedgeId>> = vec![None; mesh.n_faces()];
-    let mut queue = std::collections::VecDeque::from([from]);
-    while let Some(f) = queue.pop_front() {
-        for h in mesh.face_halfedges(f) {
-            if let Some(g) = mesh.twin(h).map(|t| mesh.face(t))
-                && g != from
-                && by[g.index()].is_none()
-            {
-                by[g.index()] = Some(h);
-                queue.push_back(g);
-            }
+    let mut search = BreadthFirst::new(mesh.n_faces());
+    search.start(from);
+    while let Some(f) = search.visit() {
+        for (h, g) in mesh.adjacent_faces(f) {
+            search.reach(g, h);
         }
     }
-    let mut out = Vec::new();
-    let mut f = to;
-    while f != from {
-        let h = by[f.index()].unwrap();
-        out.push(h);
-        f = mesh.face(h);
-    }
-    out.reverse();
-    out
+    search.path_to(to, |h| mesh.face(*h)).unwrap()
 }
 
-/// Relations between triangles far apart, all with different weights, that `map` misses by 0.01 to 0.05.
-fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<CoordinateConstraint> {
+/// Constraints between distant triangles, with residuals of 0.01 to 0.05 in `map`.
+fn constraints_off(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<CoordinateConstraint> {
     let far = mesh.n_faces() / 2;
     let one = |i: usize| {
         let [f, g] = [17 * i + 3, far + 29 * i].map(|k| FaceId::new(k % mesh.n_faces()));
@@ -98,14 +85,14 @@ fn relations(mesh: &TriMesh, map: &SeamlessMap, count: usize) -> Vec<CoordinateC
         let to =
             SurfacePoint { face: g, weights: if i.is_multiple_of(2) { [0.0, 1.0, 0.0] } else { [0.5, 0.25, 0.25] } };
         let mut r = CoordinateConstraint { from, crossed, to, axis: (i % 2) as u8, difference: 0.0 };
-        r.difference = miss(mesh, map, &r) + 0.01 * (1 + i % 5) as f64;
+        r.difference = residual(mesh, map, &r) + 0.01 * (1 + i % 5) as f64;
         r
     };
     (0..count).map(one).collect()
 }
 
 #[test]
-fn a_square_is_its_own_map() {
+fn square_is_mapped_to_itself() {
     let mesh = square(6);
     let metric = Metric::new(&mesh);
     let field = along(&mesh, &metric, |_| DVec3::X);
@@ -128,7 +115,7 @@ fn a_square_is_its_own_map() {
 }
 
 #[test]
-fn lattices_are_mapped_without_error() {
+fn lattices_are_mapped_isometrically() {
     for (mesh, count) in [(cells(&[[0, 0, 0]], 6), 8), (plate(1, 3), 16), (plate(2, 2), 24)] {
         let metric = Metric::new(&mesh);
         let field = lattice(&mesh, &metric);
@@ -153,36 +140,36 @@ fn lattices_are_mapped_without_error() {
 }
 
 #[test]
-fn relations_hold_across_cuts_and_around_handles() {
+fn constraints_hold_across_cuts_and_around_handles() {
     for mesh in [cells(&[[0, 0, 0]], 5), plate(1, 3), plate(2, 3)] {
         let metric = Metric::new(&mesh);
         let field = lattice(&mesh, &metric);
         let list = nodes(&field);
         let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
         let plain = solved(&mut system, &metric, &field);
-        let relations = relations(&mesh, &plain.map, 12);
+        let constraints = constraints_off(&mesh, &plain.map, 12);
         let cuts =
             |r: &CoordinateConstraint| r.crossed.iter().filter(|&&h| system.cut().crossing(&mesh, h).is_some()).count();
-        assert!(relations.iter().map(cuts).max() > Some(1));
-        system.set_relations(&mesh, &relations).unwrap();
+        assert!(constraints.iter().map(cuts).max() > Some(1));
+        system.set_constraints(&mesh, &constraints).unwrap();
         let bent = solved(&mut system, &metric, &field);
         check_seamless(&mesh, &bent.map);
-        for r in &relations {
-            assert!(miss(&mesh, &plain.map, r).abs() > 0.005);
-            assert!(miss(&mesh, &bent.map, r).abs() < 1e-9);
+        for r in &constraints {
+            assert!(residual(&mesh, &plain.map, r).abs() > 0.005);
+            assert!(residual(&mesh, &bent.map, r).abs() < 1e-9);
         }
         assert!(bent.energy > 1e-6);
     }
 }
 
 #[test]
-fn a_torus_takes_the_periods_asked_for() {
+fn torus_has_the_prescribed_periods() {
     let mesh = torus(24, 12);
     let metric = Metric::new(&mesh);
     let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>();
     let field = along(&mesh, &metric, |f| DVec3::Z.cross(centre(f)));
     assert_eq!(field.singularities, vec![]);
-    // Around the torus through the quads 0, 12, 24 ...: each crosses its diagonal and then its far side.
+    // Around the torus through the quads 0, 12, 24 ...; the chain crosses the diagonal and the far side of each.
     let crossed: Vec<HalfedgeId> = (0..24u32)
         .flat_map(|i| {
             let f = FaceId(2 * (12 * i));
@@ -199,22 +186,22 @@ fn a_torus_takes_the_periods_asked_for() {
     let map = solved(&mut system, &metric, &field).map;
     check_seamless(&mesh, &map);
     for r in &list {
-        assert!(miss(&mesh, &map, r).abs() < 1e-9);
+        assert!(residual(&mesh, &map, r).abs() < 1e-9);
     }
     system.set_differences(&[2.5, 0.0]).unwrap();
     let map = solved(&mut system, &metric, &field).map;
-    assert!(miss(&mesh, &map, &around(0, 2.5)).abs() < 1e-9 && miss(&mesh, &map, &around(1, 0.0)).abs() < 1e-9);
+    assert!(residual(&mesh, &map, &around(0, 2.5)).abs() < 1e-9 && residual(&mesh, &map, &around(1, 0.0)).abs() < 1e-9);
 }
 
 #[test]
-fn contradictions_and_malformed_relations_are_named() {
+fn conflicting_and_malformed_constraints_are_reported() {
     let mesh = plate(1, 3);
     let metric = Metric::new(&mesh);
     let field = lattice(&mesh, &metric);
     let list = nodes(&field);
     let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
     let map = solved(&mut system, &metric, &field).map;
-    let good = relations(&mesh, &map, 6);
+    let good = constraints_off(&mesh, &map, 6);
     let with = |more: CoordinateConstraint| {
         let all: Vec<CoordinateConstraint> = good.iter().cloned().chain([more]).collect();
         SeamlessSystem::new(&mesh, &field, &list, &all).err()
@@ -222,13 +209,13 @@ fn contradictions_and_malformed_relations_are_named() {
     assert_eq!(with(good[2].clone()), None);
     let off = CoordinateConstraint { difference: good[2].difference + 0.1, ..good[2].clone() };
     assert!(matches!(with(off), Some(ParamError::Conflict { relation: 2 | 6, .. })));
-    // A point cannot be apart from itself; seen from another triangle of the chain it is the same point.
+    // A point cannot differ from itself.
     let apart = CoordinateConstraint { crossed: vec![], to: good[0].from, difference: 0.1, ..good[0].clone() };
     assert!(matches!(with(apart), Some(ParamError::Conflict { relation: 6, .. })));
     let broken = CoordinateConstraint { crossed: good[0].crossed[1..].to_vec(), ..good[0].clone() };
-    assert_eq!(with(broken), Some(ParamError::Malformed { relation: 6 }));
+    assert_eq!(with(broken), Some(ParamError::Malformed { constraint: 6 }));
     let nan = CoordinateConstraint { difference: f64::NAN, ..good[0].clone() };
-    assert_eq!(with(nan), Some(ParamError::Malformed { relation: 6 }));
+    assert_eq!(with(nan), Some(ParamError::Malformed { constraint: 6 }));
     let other = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
     let refused = system.solve(&metric, &other, &Objective::default(), &Progress::new());
     assert!(matches!(refused, Err(ParamError::OtherJump { .. })));
@@ -248,7 +235,7 @@ fn misalignment(metric: &Metric, field: &CrossField, map: &SeamlessMap) -> f64 {
 }
 
 #[test]
-fn anisotropy_makes_isolines_follow_the_field() {
+fn anisotropy_aligns_isolines_with_the_field() {
     let mesh = octasphere(10);
     let metric = Metric::new(&mesh);
     let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
@@ -262,14 +249,14 @@ fn anisotropy_makes_isolines_follow_the_field() {
 }
 
 #[test]
-fn the_solution_is_the_minimum_of_the_energy() {
+fn solution_minimises_the_energy() {
     let mesh = octasphere(5);
     let metric = Metric::new(&mesh);
     let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
     let list = nodes(&field);
     let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
-    let relations = relations(&mesh, &solved(&mut system, &metric, &field).map, 4);
-    system.set_relations(&mesh, &relations).unwrap();
+    let constraints = constraints_off(&mesh, &solved(&mut system, &metric, &field).map, 4);
+    system.set_constraints(&mesh, &constraints).unwrap();
     let lengths = mesh.faces().map(|f| [1.0 + 0.1 * f64::from(f.0 % 3), 0.8]).collect();
     let objective = Objective { lengths, ..Objective::default() };
     let solution = system.solve(&metric, &field, &objective, &Progress::new()).unwrap();
@@ -277,7 +264,7 @@ fn the_solution_is_the_minimum_of_the_energy() {
     let energy = |y: &[f64]| {
         residuals(&metric, &field.angle, &system.map(y).uv, &objective).iter().map(|r| r.energy).sum::<f64>()
     };
-    // About the minimum the energy is the quadratic form of the matrix.
+    // Around the minimum the energy is the quadratic form of the matrix.
     let step: Vec<f64> = (0..system.n_free()).map(|i| 0.1 * (1.7 * i as f64).sin()).collect();
     let moved: Vec<f64> = solution.free.iter().zip(&step).map(|(y, d)| y + d).collect();
     let rise: f64 = matrix.multiply(&step).iter().zip(&step).map(|(a, b)| a * b).sum();
@@ -292,24 +279,85 @@ fn the_solution_is_the_minimum_of_the_energy() {
 }
 
 #[test]
-fn a_reused_analysis_gives_the_same_bits() {
+fn reused_symbolic_factorisation_gives_the_same_bits() {
     let mesh = plate(1, 3);
     let metric = Metric::new(&mesh);
     let field = lattice(&mesh, &metric);
     let list = nodes(&field);
     let mut system = SeamlessSystem::new(&mesh, &field, &list, &[]).unwrap();
-    let relations = relations(&mesh, &solved(&mut system, &metric, &field).map, 5);
-    let mut fresh = SeamlessSystem::new(&mesh, &field, &list, &relations).unwrap();
+    let constraints = constraints_off(&mesh, &solved(&mut system, &metric, &field).map, 5);
+    let mut fresh = SeamlessSystem::new(&mesh, &field, &list, &constraints).unwrap();
     let want = solved(&mut fresh, &metric, &field);
-    // There and back by differences, by relations and as a whole.
+    // Change and restore the system by differences, by constraints and by a rebuild.
     fresh.set_differences(&[0.1; 5]).unwrap();
     assert_ne!(solved(&mut fresh, &metric, &field).free, want.free);
-    fresh.set_differences(&relations.iter().map(|r| r.difference).collect::<Vec<_>>()).unwrap();
+    fresh.set_differences(&constraints.iter().map(|r| r.difference).collect::<Vec<_>>()).unwrap();
     assert_eq!(solved(&mut fresh, &metric, &field).free, want.free);
-    system.set_relations(&mesh, &relations).unwrap();
+    system.set_constraints(&mesh, &constraints).unwrap();
     assert_eq!(solved(&mut system, &metric, &field).free, want.free);
-    fresh.rebuild(&mesh, &field, &list, &relations).unwrap();
+    fresh.rebuild(&mesh, &field, &list, &constraints).unwrap();
 
     let again = solved(&mut fresh, &metric, &field);
     assert_eq!((again.free, again.map.uv), (want.free, want.map.uv));
+}
+
+/// Checks that transitions agree with both ends of every edge, that those of twins are inverse, and that their
+/// composition around a vertex is the identity, except for the rotation at singularities.
+fn check_transitions(mesh: &TriMesh, field: &CrossField, map: &SeamlessMap) {
+    check_seamless(mesh, map);
+    for h in mesh.halfedges() {
+        let (Some(there), Some(t)) = (map.transition(mesh, h), mesh.twin(h)) else { continue };
+        assert_eq!(i32::from(there.turns), (-field.jump_across(mesh, h)).rem_euclid(4));
+        let both = there.then(&map.transition(mesh, t).unwrap());
+        assert!(both.turns == 0 && both.translation.length() < 1e-12);
+    }
+    let singular = nodes(field);
+    for v in mesh.vertices().filter(|&v| !mesh.is_boundary_vertex(v)) {
+        let across = mesh.outgoing(v).map(|h| map.transition(mesh, mesh.prev(h)).unwrap());
+        let around = across.fold(Transition::IDENTITY, |t, next| t.then(&next));
+        assert_eq!(around.turns != 0, singular.contains(&v));
+        if around.turns == 0 {
+            assert!(around.translation.length() < 1e-9, "{v:?}: {}", around.translation);
+        }
+    }
+}
+
+/// The mesh with its vertices moved by up to `amount`, pseudo-randomly.
+fn perturbed(mesh: &TriMesh, amount: f64, seed: u32) -> TriMesh {
+    let noise = |k: usize| amount * (f64::from(seed) + 12.9898 * k as f64).sin();
+    let move_vertex = |(i, p): (usize, &DVec3)| *p + DVec3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2));
+    let positions = mesh.positions().iter().enumerate().map(move_vertex).collect();
+    let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
+    TriMesh::from_faces(positions, &faces).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 8, ..ProptestConfig::default() })]
+
+    #[test]
+    fn transitions_of_maps_of_perturbed_tori_are_seamless(
+        n in 10..20u32, m in 6..12u32, amount in 0.0..0.004f64, seed in 0..1000u32
+    ) {
+        let mesh = perturbed(&torus(n, m), amount, seed);
+        let metric = Metric::new(&mesh);
+        let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>();
+        let field = along(&mesh, &metric, |f| DVec3::Z.cross(centre(f)));
+        prop_assume!(field.singularities.is_empty());
+        let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+        check_transitions(&mesh, &field, &solved(&mut system, &metric, &field).map);
+    }
+
+    #[test]
+    fn transitions_of_maps_of_perturbed_spheres_are_seamless(
+        n in 3..7i32, amount in 0.0..0.02f64, seed in 0..1000u32
+    ) {
+        let mesh = perturbed(&octasphere(n), amount, seed);
+        let metric = Metric::new(&mesh);
+        let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+        let mut system = SeamlessSystem::new(&mesh, &field, &nodes(&field), &[]).unwrap();
+        let plain = solved(&mut system, &metric, &field).map;
+        check_transitions(&mesh, &field, &plain);
+        system.set_constraints(&mesh, &constraints_off(&mesh, &plain, 4)).unwrap();
+        check_transitions(&mesh, &field, &solved(&mut system, &metric, &field).map);
+    }
 }

@@ -1,50 +1,31 @@
-//! The energy of maps without folds, summed over the triangles, with its derivatives; see [`super`].
+//! The energy of locally injective maps, summed over the triangles, with its derivatives; see [`super`].
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::density::EnergyDensity;
+use super::energy_density::{DistortionWeights, EnergyDensity};
 use crate::mesh::{FaceId, HalfedgeId};
+use crate::param::newton_system::TriangleDerivatives;
 use crate::param::objective::{Objective, hats};
 use crate::surface::Metric;
 
-/// How strongly features are pulled towards isolines: across one of them, a difference of a tenth of its length weighs as
-/// much as twice the area of the triangles beside it.
-const PULL: f64 = 100.0;
-/// Doubled area over squared sides of an image up to which it is flat: what relations force to be flat is not quite so for
-/// rounding. Slivers that arcs leave have a thousand times as much and more.
-const FLAT: f64 = 1e-14;
+/// Unit of the penalty weight of isolines. Along a side of length `l`, a coordinate difference of `l / 10` costs
+/// `100 (l / 10)² = l²`, about twice the area of the triangles beside it.
+const ISOLINE_PENALTY: f64 = 100.0;
+/// Twice the area over the sum of two squared sides of an image, up to which it counts as degenerate. Images that
+/// constraints force to be degenerate are so only up to rounding errors; slivers along arcs have at least a thousand
+/// times this value.
+const DEGENERATE: f64 = 1e-14;
 
-/// What a map without folds is to be like.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DistortionWeights {
-    /// By how much components across the field count more than those along it: `ρ`, at least 1.
-    pub anisotropy: f64,
-    /// How much size counts beside shape: `λ`, positive.
-    pub size: f64,
-}
-
-impl DistortionWeights {
-    /// What is wanted where the anisotropy counts by a factor: 0 not at all, 1 as it is.
-    pub(crate) fn with_anisotropy_share(self, anisotropy_share: f64) -> Self {
-        Self { anisotropy: 1.0 + anisotropy_share * (self.anisotropy - 1.0), ..self }
-    }
-}
-
-/// The derivatives of the energy of a triangle.
-pub(super) struct Derivatives {
-    pub gradient: [f64; 6],
-    /// The lower triangle, row by row, in the order u of the corners, v of the corners.
-    pub hessian: [f64; 21],
-}
-
-/// A side of a triangle that is pulled towards an isoline: its two corners, the coordinate, how strongly, and by how much
-/// that differs from the first to the second.
-struct Pull {
+/// A penalty `weight · difference²` on a side of a triangle that should lie on an isoline.
+struct IsolinePenalty {
+    /// The two corners.
     ends: [usize; 2],
+    /// The coordinate, 0 for u or 1 for v.
     axis: usize,
-    strength: f64,
-    off: f64,
+    weight: f64,
+    /// The coordinate of the second corner minus that of the first.
+    difference: f64,
 }
 
 /// The energy of maps on one mesh along one field.
@@ -53,51 +34,50 @@ pub struct InjectiveEnergy<'a> {
     metric: &'a Metric,
     angle: &'a [f64],
     objective: &'a Objective,
-    shape: DistortionWeights,
+    weights: DistortionWeights,
     anisotropy_share: &'a [f64],
-    /// For each side of each triangle the coordinate that it is pulled towards an isoline of, and how strongly; empty:
-    /// none.
-    pulled: Vec<[Option<(u8, f64)>; 3]>,
-    /// For each triangle how far its determinant may be below zero, see [`EnergyDensity`]; empty: nowhere.
-    slack: Vec<f64>,
+    /// For each side of each triangle the coordinate that should be constant and the penalty weight; empty: none.
+    isolines: Vec<[Option<(u8, f64)>; 3]>,
+    /// `ε` of each triangle, see [`EnergyDensity`]; empty: 0 everywhere.
+    epsilon: Vec<f64>,
 }
 
 impl<'a> InjectiveEnergy<'a> {
-    /// The energy of maps along the field of the angles given, of the sizes that `objective` wants. `firmness` tells for
-    /// each triangle by what factor the anisotropy counts there; empty: 1 everywhere.
+    /// The energy of maps along the field with angles `angle` and the target lengths of `objective`. `anisotropy_share`
+    /// scales the excess of the anisotropy over 1 in each triangle (0: isotropic); empty: 1 everywhere.
     pub fn new(
         metric: &'a Metric,
         angle: &'a [f64],
         objective: &'a Objective,
-        (shape, anisotropy_share): (DistortionWeights, &'a [f64]),
+        (weights, anisotropy_share): (DistortionWeights, &'a [f64]),
     ) -> Self {
-        Self { metric, angle, objective, shape, anisotropy_share, pulled: Vec::new(), slack: Vec::new() }
+        Self { metric, angle, objective, weights, anisotropy_share, isolines: Vec::new(), epsilon: Vec::new() }
     }
 
-    /// The same, with these half-edges pulled towards isolines of a coordinate (0: u, 1: v), each so many times as strongly
-    /// as usual.
+    /// Adds penalties that draw half-edges onto isolines: half-edge, coordinate (0: u, 1: v) and relative penalty
+    /// weight. A weight of 1 is the usual one.
     pub fn with_isoline_penalties(mut self, list: &[(HalfedgeId, u8, f64)]) -> Self {
         if !list.is_empty() {
-            self.pulled = vec![[None; 3]; self.angle.len()];
+            self.isolines = vec![[None; 3]; self.angle.len()];
         }
-        for &(h, axis, strength) in list {
-            self.pulled[h.index() / 3][h.index() % 3] = Some((axis, strength * PULL));
+        for &(h, axis, weight) in list {
+            self.isolines[h.index() / 3][h.index() % 3] = Some((axis, weight * ISOLINE_PENALTY));
         }
         self
     }
 
-    /// The same with a finite energy of triangles that are turned over by as much as given; see [`super::untangle`].
-    pub(super) fn with_slack(&self, slack: Vec<f64>) -> Self {
-        Self { slack, ..self.clone() }
+    /// The regularised energy, finite for flipped triangles, with `ε` of each triangle; see [`super::untangle`].
+    pub(super) fn regularised(&self, epsilon: Vec<f64>) -> Self {
+        Self { epsilon, ..self.clone() }
     }
 
-    /// The sides of a triangle that are pulled.
-    fn pulls(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = Pull> {
-        let sides = self.pulled.get(f).copied().unwrap_or_default();
-        sides.into_iter().enumerate().filter_map(move |(i, pulled)| {
-            let ((axis, strength), j) = (pulled?, (i + 1) % 3);
+    /// The isoline penalties of a triangle.
+    fn penalties(&self, f: usize, w: &[DVec2; 3]) -> impl Iterator<Item = IsolinePenalty> {
+        let sides = self.isolines.get(f).copied().unwrap_or_default();
+        sides.into_iter().enumerate().filter_map(move |(i, isoline)| {
+            let ((axis, weight), j) = (isoline?, (i + 1) % 3);
             let axis = usize::from(axis);
-            Some(Pull { ends: [i, j], axis, strength, off: w[j][axis] - w[i][axis] })
+            Some(IsolinePenalty { ends: [i, j], axis, weight, difference: w[j][axis] - w[i][axis] })
         })
     }
 
@@ -107,77 +87,80 @@ impl<'a> InjectiveEnergy<'a> {
 
     fn density(&self, f: usize) -> EnergyDensity {
         let share = self.anisotropy_share.get(f).copied().unwrap_or(1.0);
-        EnergyDensity::new(self.shape.with_anisotropy_share(share), self.objective.target(FaceId::new(f)))
-            .with_slack(self.slack.get(f).copied().unwrap_or(0.0))
+        EnergyDensity::new(self.weights.with_anisotropy_share(share), self.objective.target(FaceId::new(f)))
+            .regularised(self.epsilon.get(f).copied().unwrap_or(0.0))
     }
 
-    /// The energy of a map; `None` where a triangle is turned over or flat.
+    /// The energy of a map; `None` if a triangle is flipped.
     pub fn of(&self, uv: &[[DVec2; 3]]) -> Option<f64> {
-        // Added up in order: the sum must not depend on threads.
+        // Summed in order: the result must not depend on the number of threads.
         let total: f64 = self.of_each(uv).into_iter().sum();
         total.is_finite().then_some(total)
     }
 
-    /// The energy of each triangle of a map, infinite where it is turned over or flat.
+    /// The energy of each triangle of a map; infinite for a flipped triangle.
     pub fn of_each(&self, uv: &[[DVec2; 3]]) -> Vec<f64> {
         let each = |(f, w): (usize, &[DVec2; 3])| {
             let area = self.metric.area(FaceId::new(f));
-            let pull: f64 = self.pulls(f, w).map(|p| p.strength * p.off * p.off).sum();
-            area * self.density(f).value(&matrix(&self.hats(f), w)).unwrap_or(f64::INFINITY) + pull
+            let penalty: f64 = self.penalties(f, w).map(|p| p.weight * p.difference * p.difference).sum();
+            area * self.density(f).value(&jacobian(&self.hats(f), w)).unwrap_or(f64::INFINITY) + penalty
         };
         uv.par_iter().enumerate().map(each).collect()
     }
 
-    /// The determinants of a map, in multiples of those wanted.
+    /// The Jacobian determinant of each triangle, in multiples of its target.
     pub(super) fn determinants(&self, uv: &[[DVec2; 3]]) -> Vec<f64> {
-        let each = |(f, w): (usize, &[DVec2; 3])| self.density(f).determinant(&matrix(&self.hats(f), w));
+        let each = |(f, w): (usize, &[DVec2; 3])| self.density(f).determinant(&jacobian(&self.hats(f), w));
         uv.par_iter().enumerate().map(each).collect()
     }
 
-    pub(super) fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> Derivatives {
+    /// The derivatives of the energy of a triangle by its corner coordinates `w`.
+    pub(super) fn derivatives(&self, f: usize, w: &[DVec2; 3]) -> TriangleDerivatives {
         let (hats, area) = (self.hats(f), self.metric.area(FaceId::new(f)));
-        let (slope, bend) = self.density(f).derivatives(&matrix(&hats, w));
+        // First and second derivatives by the entries of the Jacobian, which is linear in the coordinates.
+        let (first, second) = self.density(f).derivatives(&jacobian(&hats, w));
         let mut gradient = [0.0; 6];
         let mut hessian = [0.0; 21];
         let mut entry = 0;
         for i in 0..6 {
             let (k, hat) = (2 * (i / 3), hats[i % 3]);
-            gradient[i] = area * (hat.x * slope[k] + hat.y * slope[k + 1]);
+            gradient[i] = area * (hat.x * first[k] + hat.y * first[k + 1]);
             for j in 0..=i {
                 let (l, other) = (2 * (j / 3), hats[j % 3]);
-                let along = |r: usize| bend[r][l] * other.x + bend[r][l + 1] * other.y;
+                let along = |r: usize| second[r][l] * other.x + second[r][l + 1] * other.y;
                 hessian[entry] = area * (hat.x * along(k) + hat.y * along(k + 1));
                 entry += 1;
             }
         }
-        for Pull { ends, axis, strength, off } in self.pulls(f, w) {
+        for IsolinePenalty { ends, axis, weight, difference } in self.penalties(f, w) {
             let [p, q] = ends.map(|i| 3 * axis + i);
-            gradient[p] -= 2.0 * strength * off;
-            gradient[q] += 2.0 * strength * off;
+            gradient[p] -= 2.0 * weight * difference;
+            gradient[q] += 2.0 * weight * difference;
             for (r, c, sign) in [(p, p, 1.0), (q, q, 1.0), (p.max(q), p.min(q), -1.0)] {
-                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * strength;
+                hessian[r * (r + 1) / 2 + c] += sign * 2.0 * weight;
             }
         }
-        Derivatives { gradient, hessian }
+        TriangleDerivatives { gradient, hessian }
     }
 }
 
-/// The gradients `∇u` and `∇v` of a map in each triangle, in the frame of the field of the angles given.
+/// The gradients `∇u` and `∇v` of a map in each triangle, in the frame of the field with angles `angle`.
 pub fn gradients(metric: &Metric, angle: &[f64], uv: &[[DVec2; 3]]) -> Vec<[f64; 4]> {
-    let each = |(f, w): (usize, &[DVec2; 3])| matrix(&hats(metric, angle[f], FaceId::new(f)), w);
+    let each = |(f, w): (usize, &[DVec2; 3])| jacobian(&hats(metric, angle[f], FaceId::new(f)), w);
     uv.iter().enumerate().map(each).collect()
 }
 
-/// The triangles that a map turns over or flattens but for rounding.
-pub fn folds(uv: &[[DVec2; 3]]) -> Vec<FaceId> {
-    let folded = |w: &[DVec2; 3]| {
+/// The triangles whose image is flipped, or degenerate up to rounding errors.
+pub fn flipped_triangles(uv: &[[DVec2; 3]]) -> Vec<FaceId> {
+    let is_flipped = |w: &[DVec2; 3]| {
         let [a, b] = [w[1] - w[0], w[2] - w[0]];
-        a.perp_dot(b) <= FLAT * (a.length_squared() + b.length_squared())
+        a.perp_dot(b) <= DEGENERATE * (a.length_squared() + b.length_squared())
     };
-    uv.iter().enumerate().filter(|(_, w)| folded(w)).map(|(f, _)| FaceId::new(f)).collect()
+    uv.iter().enumerate().filter(|(_, w)| is_flipped(w)).map(|(f, _)| FaceId::new(f)).collect()
 }
 
-fn matrix(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {
+/// The Jacobian `[∂u/∂x, ∂u/∂y, ∂v/∂x, ∂v/∂y]`.
+fn jacobian(hats: &[DVec2; 3], w: &[DVec2; 3]) -> [f64; 4] {
     let u = hats[0] * w[0].x + hats[1] * w[1].x + hats[2] * w[2].x;
     let v = hats[0] * w[0].y + hats[1] * w[1].y + hats[2] * w[2].y;
     [u.x, u.y, v.x, v.y]

@@ -1,22 +1,26 @@
-//! Maps that never fold: from a map without folds down an energy that no fold can pass.
+//! Locally injective seamless maps: minimisation of an energy that is infinite for flipped triangles.
 //!
-//! Least squares do not know orientation, and where a layout asks for much distortion what they fold cannot be unfolded
-//! locally. Here every step starts from a map in which no triangle is turned over and ends in one: the energy of a
-//! triangle grows beyond all bounds as its image becomes flat, and a step ends before that. Per triangle, with the map's
-//! matrix `J = [a b; c d]` in the frame of the field (rows `∇u`, `∇v`) and `m` the determinant wanted, it is
+//! The least-squares objective does not see orientation. Where a layout forces much distortion, it flips triangles that
+//! no local repair can restore. The descent here starts from a locally injective map and keeps it so: the energy of a
+//! triangle tends to infinity as its image degenerates, and the line search stops before that. Per triangle, with the
+//! Jacobian `J = [a b; c d]` in the frame of the field (rows `∇u`, `∇v`) and target determinant `m`, the energy density
+//! is
 //!
 //! `(a² + d² + ρ (b² + c²)) / (2 det J) + λ/2 ((det J / m)² + (m / det J)²)`.
 //!
-//! With `ρ = 1` the first part is half of `σ₁/σ₂ + σ₂/σ₁`, the conformal distortion (Hormann and Greiner, MIPS, 2000);
-//! more makes directions count, as in the anisotropic norm (Campen, section 6.4.3). The second part keeps sizes near
-//! those wanted: squared, so that it costs angles little as long as these are not far off, and yet no limb is mapped to
-//! almost nothing. It is minimised by Newton's method with each triangle's Hessian made positive semidefinite (Teran,
-//! Sifakis, Irving and Fedkiw, 2005), steps cut short before the first triangle would flatten (Smith and Schaefer,
-//! Bijective Parameterization with Free Boundaries, 2015, section 3.3).
+//! For `ρ = 1` the first term is half of `σ₁/σ₂ + σ₂/σ₁`, the conformal distortion (Hormann and Greiner, MIPS, 2000).
+//! Larger `ρ` penalises errors of direction, as the anisotropic norm does (Campen, section 6.4.3). The second term
+//! keeps sizes near the target. It is quadratic, so that small errors of size hardly affect angles, while limbs are not
+//! mapped to almost nothing. The minimiser is Newton's method with each triangle's Hessian projected to positive
+//! semidefinite (Teran, Sifakis, Irving and Fedkiw, 2005). The step size is bounded by the first triangle to degenerate
+//! (Smith and Schaefer, Bijective Parameterization with Free Boundaries, 2015, section 3.3).
+//!
+//! Limits: the result depends on the initial map. [`SeamlessSystem::untangle`] obtains one from a map with few flipped
+//! triangles, [`SeamlessSystem::enforce_constraints`] from a locally injective map that violates constraints.
 
-mod approach;
-mod density;
+mod constraint_homotopy;
 mod energy;
+mod energy_density;
 #[cfg(test)]
 mod tests;
 mod untangle;
@@ -26,79 +30,52 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::assembly::Scatter;
 use super::constraints;
-use super::objective::{Local, Objective, hats};
+use super::newton_system::{NewtonSystem, TriangleDerivatives};
+use super::objective::{Objective, TriangleForm, hats};
 use super::seamless::SeamlessMap;
-use super::solve::SeamlessSystem;
+use super::seamless_system::SeamlessSystem;
 use super::{ParamError, expect_length};
 use crate::mesh::HalfedgeId;
 use crate::progress::{Cancelled, Progress};
-use crate::solve::{SolveError, SparseHermitian, SpdSymbolic};
+use crate::solve::{SolveError, SparseHermitian};
 use crate::surface::Metric;
-pub(crate) use density::EnergyDensity;
-use energy::Derivatives;
-pub use energy::{DistortionWeights, InjectiveEnergy, folds, gradients};
+pub use energy::{InjectiveEnergy, flipped_triangles, gradients};
+pub use energy_density::DistortionWeights;
+pub(crate) use energy_density::EnergyDensity;
 
-/// Share of the way to the first flat triangle that a step may go.
-const SAFE: f64 = 0.8;
-/// Share of the decrease promised by the slope that a step must achieve (Armijo).
-const SUFFICIENT: f64 = 1e-4;
-/// Halvings of a step before it is given up.
-const HALVINGS: usize = 20;
-/// A step that gains less than this share of the energy is the last if it was a whole one, after which Newton's method has
-/// arrived, and else the last but for [`PATIENCE`] more.
-const GAIN: f64 = 2e-3;
+/// Largest step size as a share of the one at which the first triangle degenerates; below 1.
+const SAFE_SHARE: f64 = 0.8;
+/// Share of the decrease predicted by the slope that a step must achieve (Armijo condition).
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+/// Halvings of the step size before the line search fails.
+const MAX_HALVINGS: usize = 20;
+/// Relative decrease of the energy below which a step counts as small. A small full Newton step means convergence; of
+/// small shortened steps, the descent stops after [`PATIENCE`] in a row.
+const MIN_DECREASE: f64 = 2e-3;
+/// Small shortened steps in a row after which the descent stops.
 const PATIENCE: usize = 2;
-/// Area of images, where 1 is usual, below and above whose inverse differences are not weighed by it.
-const LEAST_SIZE: f64 = 1e-4;
-/// By what share the diagonal is raised: a semidefinite Hessian must become definite beyond rounding.
-const GROUND: f64 = 1e-9;
+/// Smallest squared norm of a Jacobian used as a weight in [`SeamlessSystem::fit`]; its inverse is the largest. Usual
+/// values are near 1.
+const MIN_SIZE: f64 = 1e-4;
 
-/// A map without folds on its way down.
+/// A locally injective map with its energy.
 #[derive(Debug, Clone)]
 pub struct InjectiveMap {
     /// The map.
     pub map: SeamlessMap,
     /// Its free variables.
     pub free: Vec<f64>,
-    /// Its energy: an integral over the surface, that of the best map conceivable being `(1 + λ)` times the area.
+    /// Its energy: an integral over the surface. The lower bound is `(1 + λ)` times the area.
     pub energy: f64,
 }
 
-/// The Newton systems of one seamless system.
-#[derive(Debug, Clone)]
-pub struct NewtonSystem {
-    shares: Arc<Scatter>,
-    fold: Scatter,
-    symbolic: SpdSymbolic,
-}
-
-impl NewtonSystem {
-    /// How the shares of triangles make the matrix of what the seams leave.
-    pub(super) fn shares(&self) -> Arc<Scatter> {
-        self.shares.clone()
-    }
-
-    /// The Hessian, made positive definite.
-    fn matrix(&self, locals: &[Derivatives]) -> SparseHermitian<f64> {
-        let mut open = self.shares.zero.clone();
-        for (f, local) in locals.iter().enumerate() {
-            self.shares.add(f, &local.hessian, &mut open);
-        }
-        let mut matrix = self.fold.zero.clone();
-        for (k, (_, _, value)) in open.entries().enumerate() {
-            self.fold.add(k, &[value], &mut matrix);
-        }
-        matrix.raise_diagonal(GROUND);
-        matrix
-    }
-}
-
 impl SeamlessSystem {
-    /// The free variables of the map whose gradients in the frame of the field, `∇u` and `∇v` of each triangle, come
-    /// nearest to those given: exactly these if they are those of a map that satisfies all relations. Differences count
-    /// in proportion to the size of a triangle's image, so that small images do not fold for the sake of large ones, and to the weights given; none: all 1.
+    /// The free variables of the map whose gradients `∇u`, `∇v`, in the frame of the field, fit given ones in the
+    /// least-squares sense. The fit is exact if a map with these gradients satisfies all constraints.
+    ///
+    /// The residual of a triangle is weighted by the inverse squared norm of its gradients, so that triangles with
+    /// small images do not flip for the benefit of large ones, and by `weight`; empty: all 1.
     ///
     /// # Errors
     ///
@@ -112,7 +89,7 @@ impl SeamlessSystem {
     ) -> Result<Vec<f64>, ParamError> {
         expect_length("the list of angles", angle.len(), self.cut().turn.len())?;
         expect_length("the list of gradients", gradients.len(), angle.len())?;
-        let size = |[a, b, c, d]: &[f64; 4]| (a * a + b * b + c * c + d * d).clamp(LEAST_SIZE, 1.0 / LEAST_SIZE);
+        let size = |[a, b, c, d]: &[f64; 4]| (a * a + b * b + c * c + d * d).clamp(MIN_SIZE, 1.0 / MIN_SIZE);
         let extra = |f: usize| weight.get(f).copied().unwrap_or(1.0);
         let stiffness: Vec<f64> = gradients.iter().enumerate().map(|(f, g)| extra(f) / size(g)).collect();
         let plain = Objective { anisotropy: 1.0, lengths: Vec::new(), stiffness };
@@ -120,43 +97,37 @@ impl SeamlessSystem {
             let (area, hats) = (metric.area(f) * plain.stiffness[f.index()], hats(metric, angle[f.index()], f));
             let [ux, uy, vx, vy] = gradients[f.index()];
             let load = [DVec2::new(ux, uy), DVec2::new(vx, vy)].map(|g| hats.map(|hat| area * hat.dot(g)));
-            Local { load, ..plain.local(metric, angle[f.index()], f) }
+            TriangleForm { load, ..plain.form(metric, angle[f.index()], f) }
         });
         Ok(self.factor(&matrix)?.solve(&matrix, &rhs)?)
     }
 
-    /// Prepares Newton's method for the present relations, and the fit that it starts from.
+    /// Prepares Newton's method and [`Self::fit`] for the present constraints.
     ///
     /// # Errors
     ///
     /// [`ParamError::Solve`].
-    pub fn newton(&mut self) -> Result<Arc<NewtonSystem>, ParamError> {
-        if let Some(kept) = self.newton_kept() {
-            return Ok(kept);
+    pub fn newton_system(&mut self) -> Result<Arc<NewtonSystem>, ParamError> {
+        if let Some(cached) = self.cached_newton() {
+            return Ok(cached);
         }
-        let (fit, newton) = rayon::join(|| self.analysed(), || self.newton_system());
-        self.keep_analysis(fit?);
+        let prepare = || NewtonSystem::new(self.coupled_scatter(), self.constraint_reduction());
+        let (fit, newton) = rayon::join(|| self.symbolic(), prepare);
+        self.cache_symbolic(fit?);
         let newton = Arc::new(newton?);
-        self.keep_newton(&newton);
+        self.cache_newton(&newton);
         Ok(newton)
     }
 
-    fn newton_system(&self) -> Result<NewtonSystem, SolveError> {
-        let shares = self.whole_shares();
-        let fold = Scatter::of_matrix(&shares.zero, self.ties());
-        let symbolic = SpdSymbolic::new(&fold.zero)?;
-        Ok(NewtonSystem { shares, fold, symbolic })
-    }
-
-    /// A map with its energy; `None` if it folds.
-    pub fn injective(&self, energy: &InjectiveEnergy<'_>, free: Vec<f64>) -> Option<InjectiveMap> {
+    /// The map with free variables `free` and its energy; `None` if a triangle is flipped.
+    pub fn injective_map(&self, energy: &InjectiveEnergy<'_>, free: Vec<f64>) -> Option<InjectiveMap> {
         let map = self.map(&free);
         let total = energy.of(&map.uv)?;
         Some(InjectiveMap { map, free, energy: total })
     }
 
-    /// Makes the energy of a map without folds less in at most `steps` steps of Newton's method; tells whether it is as
-    /// good as least.
+    /// Minimises the energy of a locally injective map by at most `steps` Newton steps. Returns whether it has
+    /// converged.
     ///
     /// # Errors
     ///
@@ -173,18 +144,17 @@ impl SeamlessSystem {
         for step in 0..steps {
             progress.check()?;
             let (matrix, downhill) = self.newton_matrix(newton, energy, &at.map.uv);
-            let solved = newton.symbolic.factor(&matrix).and_then(|f| f.solve(&matrix, &downhill));
-            let direction = match solved {
+            let direction = match newton.solve(&matrix, &downhill) {
                 Ok(direction) => direction,
-                // Near its limits the solver still tells a direction downhill: that of steepest descent.
+                // Fallback where the matrix is numerically singular: steepest descent.
                 Err(SolveError::Residual { .. } | SolveError::NotPositiveDefinite { .. }) => downhill.clone(),
                 Err(_) => return Ok(true),
             };
             let slope: f64 = direction.iter().zip(&downhill).map(|(a, b)| a * b).sum();
             let before = at.energy;
-            let Some(share) = self.search(energy, at, &direction, slope) else { return Ok(true) };
-            tracing::debug!(step, share, energy = at.energy, "map without folds");
-            if before - at.energy < GAIN * at.energy {
+            let Some(share) = self.line_search(energy, at, &direction, slope) else { return Ok(true) };
+            tracing::debug!(step, share, energy = at.energy, "Newton step of a locally injective map");
+            if before - at.energy < MIN_DECREASE * at.energy {
                 patience -= 1;
                 if patience == 0 || share == 1.0 {
                     return Ok(true);
@@ -196,9 +166,9 @@ impl SeamlessSystem {
         Ok(false)
     }
 
-    /// Goes along a direction as far as it makes the energy less by enough and nothing folds; tells which share of it that
-    /// is, if it does at all.
-    fn search(
+    /// Backtracking line search (Armijo) that keeps all triangles from flipping. Returns the step size; `None` if no
+    /// step decreases the energy.
+    fn line_search(
         &self,
         energy: &InjectiveEnergy<'_>,
         at: &mut InjectiveMap,
@@ -210,10 +180,10 @@ impl SeamlessSystem {
         }
         let moved = |t: f64| at.free.iter().zip(direction).map(|(y, d)| y + t * d).collect::<Vec<f64>>();
         let full = self.map(&moved(1.0));
-        let mut t = (SAFE * first_flat(&at.map.uv, &full.uv)).min(1.0);
-        for _ in 0..HALVINGS {
-            if let Some(next) = self.injective(energy, moved(t))
-                && next.energy <= at.energy - SUFFICIENT * t * slope
+        let mut t = (SAFE_SHARE * first_degenerate(&at.map.uv, &full.uv)).min(1.0);
+        for _ in 0..MAX_HALVINGS {
+            if let Some(next) = self.injective_map(energy, moved(t))
+                && next.energy <= at.energy - SUFFICIENT_DECREASE * t * slope
             {
                 *at = next;
                 return Some(t);
@@ -223,31 +193,32 @@ impl SeamlessSystem {
         None
     }
 
-    /// The Hessian, made positive definite, and the direction of steepest descent.
+    /// The Hessian, made positive definite, and the negative gradient.
     fn newton_matrix(
         &self,
         newton: &NewtonSystem,
         energy: &InjectiveEnergy<'_>,
         uv: &[[DVec2; 3]],
     ) -> (SparseHermitian<f64>, Vec<f64>) {
-        let locals: Vec<Derivatives> = uv.par_iter().enumerate().map(|(f, w)| energy.derivatives(f, w)).collect();
-        rayon::join(|| newton.matrix(&locals), || self.downhill(&locals))
+        let triangles: Vec<TriangleDerivatives> =
+            uv.par_iter().enumerate().map(|(f, w)| energy.derivatives(f, w)).collect();
+        rayon::join(|| newton.matrix(&triangles), || self.downhill(&triangles))
     }
 
-    /// The direction of steepest descent.
-    fn downhill(&self, locals: &[Derivatives]) -> Vec<f64> {
+    /// The negative gradient with respect to the free variables.
+    fn downhill(&self, triangles: &[TriangleDerivatives]) -> Vec<f64> {
         let mut load = vec![0.0; self.seams().n_free()];
-        for (f, local) in locals.iter().enumerate() {
-            for (k, share) in local.gradient.iter().enumerate() {
+        for (f, triangle) in triangles.iter().enumerate() {
+            for (k, value) in triangle.gradient.iter().enumerate() {
                 let (variable, sign) = constraints::corner(self.cut(), HalfedgeId::new(3 * f + k % 3), (k / 3) as u32);
                 for &(z, c) in self.seams().expression(variable as usize).0 {
-                    load[z as usize] -= sign * c * share;
+                    load[z as usize] -= sign * c * value;
                 }
             }
         }
         let mut downhill = vec![0.0; self.n_free()];
         for (z, b) in load.into_iter().enumerate() {
-            for &(y, c) in self.ties().expression(z).0 {
+            for &(y, c) in self.constraint_reduction().expression(z).0 {
                 downhill[y as usize] += c * b;
             }
         }
@@ -255,12 +226,13 @@ impl SeamlessSystem {
     }
 }
 
-/// The first time at which a triangle that is not turned over becomes flat when all corners go from one map to another at constant speed.
-fn first_flat(from: &[[DVec2; 3]], to: &[[DVec2; 3]]) -> f64 {
+/// The first time at which a triangle degenerates when all corners move linearly from one map to another; infinite if
+/// none does. Triangles that are flipped at the start do not count.
+fn first_degenerate(from: &[[DVec2; 3]], to: &[[DVec2; 3]]) -> f64 {
     let flat = |(p, q): (&[DVec2; 3], &[DVec2; 3])| {
         let [e, g] = [p[1] - p[0], p[2] - p[0]];
         let [de, dg] = [q[1] - q[0] - e, q[2] - q[0] - g];
-        // det(t) = a t² + b t + c: where c > 0 its first positive root, in the form that loses no digits.
+        // det(t) = a t² + b t + c. For c > 0 the first positive root, in the form without cancellation.
         let (a, b, c) = (de.perp_dot(dg), e.perp_dot(dg) + de.perp_dot(g), e.perp_dot(g));
         let root = b * b - 4.0 * a * c;
         if root < 0.0 || c <= 0.0 {

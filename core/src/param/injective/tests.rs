@@ -1,4 +1,4 @@
-//! Checks of maps without folds on shapes whose best maps are known.
+//! Locally injective maps of a square whose optimal maps are known.
 
 use glam::{DVec2, DVec3};
 
@@ -20,24 +20,25 @@ fn flat() -> (TriMesh, Metric, CrossField) {
     (mesh, metric, field)
 }
 
-/// Coordinates that a function of the place gives to the corners of all triangles.
+/// Corner coordinates of all triangles given by a function of the position.
 fn mapped(mesh: &TriMesh, map: impl Fn(DVec2) -> DVec2) -> Vec<[DVec2; 3]> {
     mesh.faces().map(|f| mesh.face_vertices(f).map(|v| map(mesh.position(v).truncate()))).collect()
 }
 
-/// The system of a square, and the free variables of the map nearest to coordinates given.
+/// The system of a square, and the free variables of the map fitted to the gradients of given coordinates.
 fn fitted(mesh: &TriMesh, metric: &Metric, field: &CrossField, uv: &[[DVec2; 3]]) -> (SeamlessSystem, Vec<f64>) {
     let mut system = SeamlessSystem::new(mesh, field, &[], &[]).unwrap();
     let free = system.fit(metric, &field.angle, &gradients(metric, &field.angle, uv), &[]).unwrap();
     (system, free)
 }
 
+/// A smooth deformation of the square without flips.
 fn bent(p: DVec2) -> DVec2 {
     1.5 * p + 0.15 * DVec2::new((7.0 * p.y).sin(), (5.0 * p.x).cos())
 }
 
 #[test]
-fn fitted_to_its_own_gradients_a_map_comes_back() {
+fn fit_to_own_gradients_reproduces_the_map() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, bent);
     let (system, free) = fitted(&mesh, &metric, &field, &uv);
@@ -49,20 +50,20 @@ fn fitted_to_its_own_gradients_a_map_comes_back() {
 }
 
 #[test]
-fn a_bent_square_becomes_straight_without_ever_folding() {
+fn descent_straightens_a_bent_square_without_flips() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, bent);
     let (mut system, free) = fitted(&mesh, &metric, &field, &uv);
     let objective = Objective::default();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
-    let mut at = system.injective(&energy, free).unwrap();
-    let newton = system.newton().unwrap();
+    let mut at = system.injective_map(&energy, free).unwrap();
+    let newton = system.newton_system().unwrap();
     let best = 1.0 + SHAPE.size;
     let mut before = at.energy;
     assert!(before > 1.5 * best);
     for _ in 0..40 {
         system.descend(&newton, &energy, &mut at, 1, &Progress::new()).unwrap();
-        assert!(at.energy <= before && folds(&at.map.uv).is_empty());
+        assert!(at.energy <= before && flipped_triangles(&at.map.uv).is_empty());
         before = at.energy;
     }
     assert!((at.energy - best).abs() < 1e-9, "{}", at.energy - best);
@@ -73,7 +74,7 @@ fn a_bent_square_becomes_straight_without_ever_folding() {
 }
 
 #[test]
-fn a_map_that_folds_has_no_energy() {
+fn map_with_flipped_triangles_has_no_energy() {
     let (mesh, metric, field) = flat();
     let system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
     let objective = Objective::default();
@@ -81,45 +82,45 @@ fn a_map_that_folds_has_no_energy() {
     let mut uv = mapped(&mesh, |p| p);
     assert!((energy.of(&uv).unwrap() - (1.0 + SHAPE.size)).abs() < 1e-12);
     uv[5].swap(1, 2);
-    assert_eq!(folds(&uv), [FaceId(5)]);
+    assert_eq!(flipped_triangles(&uv), [FaceId(5)]);
     assert_eq!(energy.of(&uv), None);
-    // All variables alike: every triangle is a point.
-    assert!(system.injective(&energy, vec![0.0; system.n_free()]).is_none());
+    // All variables equal: every image is a point.
+    assert!(system.injective_map(&energy, vec![0.0; system.n_free()]).is_none());
 }
 
 #[test]
-fn a_map_with_folds_is_untangled_and_satisfies_all_that_it_did() {
+fn untangling_removes_flips_and_keeps_constraints() {
     let (mesh, metric, field) = flat();
-    // Between the sides the square is pulled across itself.
+    // The middle of the square is moved across its surroundings.
     let tangled = |p: DVec2| p + 0.5 * DVec2::X * (-40.0 * (p - 0.4).length_squared()).exp();
     let (mut system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, tangled));
     let objective = Objective::default();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
-    assert!(folds(&system.map(&free).uv).len() > 5);
-    assert!(system.injective(&energy, free.clone()).is_none());
-    let newton = system.newton().unwrap();
+    assert!(flipped_triangles(&system.map(&free).uv).len() > 5);
+    assert!(system.injective_map(&energy, free.clone()).is_none());
+    let newton = system.newton_system().unwrap();
     let border = |v: VertexId| mesh.is_boundary_vertex(v);
     let quarters: Vec<u32> = mesh.vertices().map(|v| if border(v) { 0 } else { 4 }).collect();
     let around = |quarters: &[u32]| {
         system.untangle(&newton, &energy, free.clone(), (&mesh, quarters), &Progress::new()).unwrap()
     };
     let found = around(&quarters).unwrap();
-    assert!(folds(&found.map.uv).is_empty());
+    assert!(flipped_triangles(&found.map.uv).is_empty());
     assert_eq!(found.energy, energy.of(&found.map.uv).unwrap());
     assert_eq!(found.map.uv, system.map(&found.free).uv);
-    // No map without folds winds around a regular vertex twice.
+    // No locally injective map has the angle 4π around a regular vertex.
     let twice: Vec<u32> = quarters.iter().map(|q| 2 * q).collect();
     assert!(around(&twice).is_none());
 }
 
 #[test]
-fn the_derivatives_are_those_of_the_energy() {
+fn derivatives_match_finite_differences() {
     let (mesh, metric, field) = flat();
     let objective = Objective { lengths: vec![[1.2, 0.8]; mesh.n_faces()], ..Objective::default() };
     let anisotropy_share: Vec<f64> = mesh.faces().map(|f| 0.1 * f64::from(f.0 % 10)).collect();
-    let pulled: Vec<_> = (0..20).map(|k| (HalfedgeId::new(11 * k), (k % 2) as u8, 1.0 + (k % 3) as f64)).collect();
+    let penalised: Vec<_> = (0..20).map(|k| (HalfedgeId::new(11 * k), (k % 2) as u8, 1.0 + (k % 3) as f64)).collect();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &anisotropy_share))
-        .with_isoline_penalties(&pulled);
+        .with_isoline_penalties(&penalised);
     let uv = mapped(&mesh, bent);
     for f in [0, 11, 40, 77] {
         let exact = energy.derivatives(f, &uv[f]).gradient;
@@ -136,43 +137,44 @@ fn the_derivatives_are_those_of_the_energy() {
 }
 
 #[test]
-fn features_are_pulled_towards_isolines() {
+fn isoline_penalties_align_features() {
     let (mesh, metric, field) = flat();
-    // The diagonals of a column of quads: no isoline by themselves.
+    // The diagonals of a column of quads, which are no isolines without penalties.
     let slanted = |h: &HalfedgeId| {
         let d = mesh.vector(*h);
         d.x.abs() > 0.1 && d.y.abs() > 0.1 && mesh.position(mesh.origin(*h)).x < 0.3
     };
-    let pulled: Vec<_> = mesh.halfedges().filter(slanted).map(|h| (h, 0, 1.0)).collect();
-    assert!(!pulled.is_empty());
+    let penalised: Vec<_> = mesh.halfedges().filter(slanted).map(|h| (h, 0, 1.0)).collect();
+    assert!(!penalised.is_empty());
     let objective = Objective::default();
     let (mut system, free) = fitted(&mesh, &metric, &field, &mapped(&mesh, |p| p));
     let off = |map: &SeamlessMap| -> f64 {
         let across =
             |h: HalfedgeId| map.uv[h.index() / 3][(h.index() % 3 + 1) % 3].x - map.uv[h.index() / 3][h.index() % 3].x;
-        pulled.iter().map(|&(h, ..)| across(h).abs()).fold(0.0, f64::max)
+        penalised.iter().map(|&(h, ..)| across(h).abs()).fold(0.0, f64::max)
     };
-    let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).with_isoline_penalties(&pulled);
-    let mut at = system.injective(&energy, free).unwrap();
+    let energy =
+        InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).with_isoline_penalties(&penalised);
+    let mut at = system.injective_map(&energy, free).unwrap();
     let before = off(&at.map);
-    let newton = system.newton().unwrap();
+    let newton = system.newton_system().unwrap();
     system.descend(&newton, &energy, &mut at, 60, &Progress::new()).unwrap();
     let gently = off(&at.map);
     assert!(gently < 0.2 * before, "{gently} {before}");
-    let hard: Vec<_> = pulled.iter().map(|&(h, axis, _)| (h, axis, 1e4)).collect();
+    let hard: Vec<_> = penalised.iter().map(|&(h, axis, _)| (h, axis, 1e4)).collect();
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[])).with_isoline_penalties(&hard);
-    let mut at = system.injective(&energy, at.free).unwrap();
+    let mut at = system.injective_map(&energy, at.free).unwrap();
     system.descend(&newton, &energy, &mut at, 60, &Progress::new()).unwrap();
     assert!(off(&at.map) < 1e-3 * gently, "{} {gently}", off(&at.map));
 }
 
 #[test]
-fn relations_are_reached_without_folding_or_what_stands_against_them_is_told() {
+fn constraint_homotopy_reaches_constraints_or_reports_obstructing_triangles() {
     let (mesh, metric, field) = flat();
     let uv = mapped(&mesh, |p| p);
     let face = FaceId(40);
     let corner = |i: usize| SurfacePoint { face, weights: [0, 1, 2].map(|k| f64::from(u8::from(k == i))) };
-    let alike = |i: usize, axis: u8| CoordinateConstraint {
+    let equal = |i: usize, axis: u8| CoordinateConstraint {
         from: corner(i),
         crossed: Vec::new(),
         to: corner((i + 1) % 3),
@@ -183,17 +185,17 @@ fn relations_are_reached_without_folding_or_what_stands_against_them_is_told() {
     let energy = InjectiveEnergy::new(&metric, &field.angle, &objective, (SHAPE, &[]));
     let origin = uv[0][0];
     let uv: Vec<_> = uv.iter().map(|w| w.map(|p| p - origin)).collect();
-    let reached = |relations: &[CoordinateConstraint]| {
-        let mut system = SeamlessSystem::new(&mesh, &field, &[], relations).unwrap();
-        let newton = system.newton().unwrap();
+    let reached = |constraints: &[CoordinateConstraint]| {
+        let mut system = SeamlessSystem::new(&mesh, &field, &[], constraints).unwrap();
+        let newton = system.newton_system().unwrap();
         let from = (&field.angle[..], &uv[..]);
-        system.approach((&mesh, &metric), (&newton, &energy), from, &Progress::new()).unwrap()
+        system.enforce_constraints((&mesh, &metric), (&newton, &energy), from, &Progress::new()).unwrap()
     };
     for i in 0..3 {
-        let w = reached(&[alike(i, 0)]).unwrap().map.uv;
-        assert!(folds(&w).is_empty());
+        let w = reached(&[equal(i, 0)]).unwrap().map.uv;
+        assert!(flipped_triangles(&w).is_empty());
         assert!((w[40][i].x - w[40][(i + 1) % 3].x).abs() < 1e-9);
     }
-    // A side that is a point flattens its triangle.
-    assert!(reached(&[alike(0, 0), alike(0, 1)]).unwrap_err().contains(&face));
+    // A side of length zero makes its triangle degenerate.
+    assert!(reached(&[equal(0, 0), equal(0, 1)]).unwrap_err().contains(&face));
 }

@@ -1,6 +1,6 @@
 //! The arrangement of dual curves: crossings, segments between them, and regions (Campen, sections 2.1, 5.1).
 //!
-//! The curves are inserted into a refined mesh as paths of marked edges ([`super::refined_mesh`]). A crossing is a vertex
+//! The curves are inserted into a refined mesh as paths of marked edges ([`super::path_insertion`]). A crossing is a vertex
 //! with four marked edges, an end is a boundary vertex with one, a segment is a chain of marked edges between such vertices,
 //! and a region is a set of triangles joined across unmarked edges. All of them follow from the connectivity of that mesh.
 

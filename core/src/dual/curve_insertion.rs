@@ -9,7 +9,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::refined_mesh::{Mark, NoPath, RefinedMesh, prev};
+use super::path_insertion::NoPath;
+use super::refined_mesh::{Mark, RefinedMesh, prev};
 use super::slot_choice::{self, ChordEnd};
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh};
 use crate::surface::SurfaceCurve;

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::refined_mesh::NoPath;
+use super::path_insertion::NoPath;
 use crate::mesh::TriMeshError;
 use crate::surface::CurveError;
 

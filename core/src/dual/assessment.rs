@@ -1,36 +1,38 @@
-//! What is still missing, region by region (Campen, section 7.2).
+//! Assessment of regions: what a region lacks to be a node of a quad layout (Campen, section 7.2).
 //!
-//! Red: the region cannot be a node of a quad layout. Orange: it holds several pronounced corners of the
-//! shape, which more strips could tell apart. Yellow: its valence is far from what its curvature asks for.
+//! Red: the region cannot be a node of a quad layout. Orange: the region contains several pronounced corners of the shape,
+//! which further strips could separate, or is a digon. Yellow: its valence differs from the valence that its curvature asks
+//! for.
 
 use std::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::arrangement::{Arrangement, Region, SideKind};
+use super::arrangement::Arrangement;
+use super::regions::{Region, SideKind};
 use crate::mesh::{TriMesh, VertexId};
 
-/// Urgency of a region.
+/// Urgency of the findings of a region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Colour {
-    /// Nothing to do.
+    /// No finding.
     None,
-    /// Valence and curvature disagree by more than one.
+    /// The valence differs by more than 1 from what the curvature asks for.
     Yellow,
-    /// Several pronounced corners share the region.
+    /// The region contains several pronounced corners, or is a digon.
     Orange,
-    /// Not a node of a valid layout.
+    /// The region cannot be a node of a quad layout.
     Red,
 }
 
-/// What is remarkable about a region.
+/// A finding about a region.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Finding {
-    /// No strip touches this component of the surface.
+    /// The region is a whole component of the surface, without strips.
     Untouched,
-    /// No strip crosses here: the region has no corner.
+    /// The region has no corner: no strips cross at its border.
     NoCorner,
     /// The region has handles.
     Handles {
@@ -42,27 +44,27 @@ pub enum Finding {
         /// How many.
         borders: usize,
     },
-    /// The region touches the boundary of the surface in several places, or along a whole boundary loop.
+    /// The border of the region has several stretches of the surface's boundary, or a whole boundary loop.
     Boundary {
         /// Number of whole boundary loops.
         whole: usize,
         /// Number of stretches, whole loops included.
         stretches: usize,
     },
-    /// Only one patch would meet at the node, folded onto itself.
+    /// One corner: a single patch would meet itself at the node.
     Monogon,
-    /// Only two patches meet at the node: valid, but flat.
+    /// Two corners: valid, but the two patches at the node are degenerate.
     Digon,
-    /// Several pronounced corners of the shape.
+    /// The region contains several pronounced corners of the shape.
     SeveralCorners {
         /// How many.
         corners: usize,
     },
-    /// Valence and curvature disagree.
+    /// The valence differs from what the curvature asks for.
     Valence {
-        /// Patches that meet at the node.
+        /// Number of patches that meet at the node.
         valence: usize,
-        /// What the curvature asks for.
+        /// The valence that the curvature asks for.
         ideal: f64,
     },
 }
@@ -70,24 +72,26 @@ pub enum Finding {
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
-            Self::Untouched => write!(f, "no strip has been placed here yet"),
+            Self::Untouched => write!(f, "no strip lies on this part of the surface"),
             Self::NoCorner => write!(f, "no two strips cross at its border"),
-            Self::Handles { handles: 1 } => write!(f, "holds a handle: a strip must go through or around it"),
-            Self::Handles { handles } => write!(f, "holds {handles} handles: strips must go through or around them"),
+            Self::Handles { handles: 1 } => write!(f, "contains a handle: a strip must run through or around it"),
+            Self::Handles { handles } => {
+                write!(f, "contains {handles} handles: strips must run through or around them")
+            }
             Self::Borders { borders: 2 } => write!(f, "is a ring: a strip must cross it"),
             Self::Borders { borders } => write!(f, "has {borders} borders: strips must join them"),
-            Self::Boundary { whole: 1, .. } => write!(f, "holds a whole boundary loop: a strip must end there"),
+            Self::Boundary { whole: 1, .. } => write!(f, "contains a whole boundary loop: a strip must end there"),
             Self::Boundary { whole, .. } if whole > 1 => {
-                write!(f, "holds {whole} whole boundary loops: strips must end there")
+                write!(f, "contains {whole} whole boundary loops: strips must end there")
             }
             Self::Boundary { stretches, .. } => {
-                write!(f, "touches the boundary in {stretches} places: a strip must separate them")
+                write!(f, "meets the boundary in {stretches} places: a strip must separate them")
             }
-            Self::Monogon => write!(f, "a strip crosses itself around it: a second strip must cross it"),
-            Self::Digon => write!(f, "only two patches meet here, so they are folded flat: a strip should cross"),
-            Self::SeveralCorners { corners } => write!(f, "holds {corners} corners of the shape"),
+            Self::Monogon => write!(f, "is bounded by one strip crossing itself: a second strip must cross it"),
+            Self::Digon => write!(f, "has valence 2, so its two patches are degenerate: a strip should cross it"),
+            Self::SeveralCorners { corners } => write!(f, "contains {corners} corners of the shape"),
             Self::Valence { valence, ideal } => {
-                write!(f, "{valence} patches meet here, its curvature asks for {ideal:.1}")
+                write!(f, "has valence {valence}; its curvature asks for {ideal:.1}")
             }
         }
     }
@@ -98,20 +102,19 @@ impl std::fmt::Display for Finding {
 pub struct RegionReport {
     /// Urgency.
     pub colour: Colour,
-    /// Reasons, the most urgent first.
+    /// The findings, the most urgent first.
     pub findings: Vec<Finding>,
-    /// Patches that meet at the region's node.
+    /// Number of patches that meet at the region's node.
     pub valence: usize,
-    /// Integral of the Gaussian curvature, and of the boundary's geodesic curvature, in radians.
+    /// Integral of the Gaussian curvature over the region plus that of the boundary's geodesic curvature, in radians.
     pub curvature: f64,
     /// Area, in units of the mesh.
     pub area: f64,
-    /// Pronounced corners of the shape inside: vertex and index in quarters.
+    /// Pronounced corners of the shape in the region: vertex, and index in quarters.
     pub corners: Vec<(VertexId, i8)>,
 }
 
-/// What each vertex of `mesh` adds to the curvature of its region, in radians: its angle defect, or the turning
-/// of the boundary.
+/// Curvature of each vertex of `mesh`, in radians: the angle defect, on the boundary the turning angle.
 pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
     let one = |v| {
         let angle: f64 = mesh.outgoing(v).map(|h| mesh.corner_angle(h)).sum();
@@ -123,8 +126,8 @@ pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
 
 /// Assesses every region of `arrangement`.
 ///
-/// `curvatures` are those of [`vertex_curvatures`] of the mesh before refinement, `corners` its pronounced
-/// corners (vertex, index in quarters).
+/// `curvatures` are the [`vertex_curvatures`] of the mesh before refinement, `corners` its pronounced corners: vertex, and
+/// index in quarters.
 pub fn assess(arrangement: &Arrangement, curvatures: &[f64], corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
     let region_of_vertex = |v: VertexId| {
         let h = arrangement.refined.vertex_halfedge(v.0);
@@ -162,6 +165,7 @@ fn assess_region(
     if !red && valence == 2 && region.boundary_stretches() == 0 {
         findings.push(Finding::Digon);
     }
+    // A node of valence v takes the curvature ½π (4 − v), on the boundary ½π (2 − v).
     let flat = if region.boundary_stretches() > 0 { 2.0 } else { 4.0 };
     let ideal = flat - 2.0 * curvature / PI;
     if !red && (valence as f64 - ideal).abs() > 1.0 {
@@ -177,14 +181,14 @@ fn assess_region(
     RegionReport { colour, findings, valence, curvature, area, corners }
 }
 
-/// Why a region cannot be a node; empty where it can.
+/// Why a region cannot be a node of a quad layout; empty if it can.
 fn red_findings(region: &Region) -> Vec<Finding> {
     let mut findings = Vec::new();
     let borders = region.borders.len();
     if region.borders.iter().flatten().all(|s| s.kind == SideKind::Boundary) {
         findings.push(Finding::Untouched);
     }
-    // χ = 2 − 2 g − b for the open region, its borders counted whether curve or boundary.
+    // χ = 2 − 2 g − b for an open region of genus g with b borders, of curves or of the surface's boundary.
     let handles = (2 - borders as i64 - region.euler) / 2;
     if handles > 0 {
         findings.push(Finding::Handles { handles });
@@ -194,7 +198,6 @@ fn red_findings(region: &Region) -> Vec<Finding> {
     if whole_loops > 0 || stretches > 1 {
         findings.push(Finding::Boundary { whole: whole_loops, stretches });
     }
-    // Handles and boundary loops are borders' causes of their own; what is left is borders of curves.
     if borders > 1 {
         findings.push(Finding::Borders { borders });
     }
@@ -211,4 +214,72 @@ fn red_findings(region: &Region) -> Vec<Finding> {
 fn face_area(arrangement: &Arrangement, f: u32) -> f64 {
     let [a, b, c] = arrangement.refined.corners(f).map(|v| arrangement.refined.positions[v as usize]);
     0.5 * (b - a).cross(c - a).length()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::SurfaceCurve;
+    use crate::testing::{column, diagonal, row, square, torus};
+
+    fn assessed(mesh: &TriMesh, curves: &[SurfaceCurve], corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
+        let arrangement = Arrangement::new(mesh, curves).unwrap();
+        assess(&arrangement, &vertex_curvatures(mesh), corners)
+    }
+
+    #[test]
+    fn vertex_curvatures_sum_to_the_euler_characteristic() {
+        for mesh in [torus(8, 6), square(4)] {
+            let total: f64 = vertex_curvatures(&mesh).iter().sum();
+            assert!((total - 2.0 * PI * mesh.euler_characteristic() as f64).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_torus_without_strips_is_red_for_its_handle() {
+        let reports = assessed(&torus(8, 6), &[], &[]);
+        assert_eq!(reports[0].colour, Colour::Red);
+        assert_eq!(reports[0].findings, [Finding::Untouched, Finding::Handles { handles: 1 }]);
+    }
+
+    #[test]
+    fn a_ring_between_strips_is_red_until_a_strip_crosses_it() {
+        let mesh = torus(8, 6);
+        let rows = [row(8, 1, true, 0.5), row(8, 4, true, 0.5)];
+        let reports = assessed(&mesh, &rows, &[]);
+        assert!(reports.iter().all(|r| r.findings == [Finding::Borders { borders: 2 }]));
+        let [a, b] = rows;
+        let reports = assessed(&mesh, &[a, b, column(8, 6, 2, true, 0.5)], &[]);
+        assert!(reports.iter().all(|r| r.colour != Colour::Red && r.valence == 4));
+    }
+
+    #[test]
+    fn a_whole_boundary_loop_asks_for_a_strip_to_end_there() {
+        let reports = assessed(&square(4), &[], &[]);
+        assert!(reports[0].findings.contains(&Finding::Boundary { whole: 1, stretches: 1 }));
+        let reports = assessed(&square(4), &[row(4, 1, false, 0.5)], &[]);
+        assert!(reports.iter().all(|r| r.findings == [Finding::NoCorner]));
+    }
+
+    #[test]
+    fn corners_that_share_a_region_are_orange() {
+        let mesh = square(6);
+        let strips = [row(6, 2, false, 0.5), column(6, 6, 3, false, 0.5)];
+        let near = [(VertexId(0), 1), (VertexId(1), 1)];
+        let reports = assessed(&mesh, &strips, &near);
+        let shared = reports.iter().find(|r| r.corners.len() == 2).unwrap();
+        assert_eq!((shared.colour, shared.findings[0]), (Colour::Orange, Finding::SeveralCorners { corners: 2 }));
+        let apart = [(VertexId(0), 1), (VertexId(48), 1)];
+        assert!(assessed(&mesh, &strips, &apart).iter().all(|r| r.corners.len() < 2 && r.colour < Colour::Orange));
+    }
+
+    #[test]
+    fn curvature_and_area_are_those_of_the_surface() {
+        let mesh = torus(8, 8);
+        let reports = assessed(&mesh, &[row(8, 1, true, 0.5), column(8, 8, 3, true, 0.5), diagonal(8)], &[]);
+        let curvature: f64 = reports.iter().map(|r| r.curvature).sum();
+        let (area, whole) =
+            (reports.iter().map(|r| r.area).sum::<f64>(), mesh.faces().map(|f| mesh.face_area(f)).sum::<f64>());
+        assert!(curvature.abs() < 1e-9 && (area - whole).abs() < 1e-9 * whole);
+    }
 }

@@ -1,8 +1,8 @@
-//! Crossings of curves that need not be.
+//! Removal of bigons: pairs of crossings of two curves that are not necessary.
 //!
-//! Two curves that cross twice in a row and go the same way between are pulled apart by letting each go the other's way
-//! there. This happens to curves that run beside each other or cross at a small angle when they are laid onto another
-//! mesh, as a matter of a triangle or two; longer ways are left alone, since they may lead around something.
+//! Two curves that cross twice in a row, and run close to each other in between, exchange these stretches. Such bigons arise
+//! when curves that run side by side, or cross at a small angle, are mapped onto another mesh, and span a few triangles.
+//! Larger bigons are kept, as they may not be contractible.
 
 use std::collections::HashMap;
 
@@ -11,63 +11,67 @@ use glam::DVec2;
 use crate::mesh::{FaceId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
 
-/// Edges that both ways together cross at most.
-const LONGEST: usize = 24;
-/// Pairs of crossings removed at most, which is far more than there ever are.
-const MOST: usize = 1000;
+/// Largest number of mesh edges that the two stretches of a bigon cross together. Chosen by hand.
+const MAX_STRETCH_EDGES: usize = 24;
+/// Largest number of bigons removed: a safeguard far above the number that occurs.
+const MAX_BIGONS: usize = 1000;
 
-/// A place on a curve: the curve, the crossing before which it lies, and how far along between the two.
+/// A position on a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct CurvePosition {
     curve: usize,
+    /// The mesh-edge crossing after it.
     step: usize,
+    /// Fraction of the chord between the crossing before and the crossing after.
     t: f64,
 }
 
-/// A piece of a curve in a triangle.
-struct Piece {
+/// The part of a curve in a triangle.
+struct Chord {
     curve: usize,
+    /// The mesh-edge crossing at its end.
     step: usize,
     ends: [DVec2; 2],
 }
 
-/// Removes the crossings of curves that lie in pairs a few triangles apart; tells how many pairs there were.
+/// Exchanges the stretches of `curves` that bound small bigons, until there are none. Returns the number of bigons removed.
 pub fn remove_bigons(mesh: &TriMesh, curves: &mut [SurfaceCurve]) -> usize {
     let mut removed = 0;
-    while removed < MOST
-        && let Some([a, b]) = bigon(mesh, curves)
+    while removed < MAX_BIGONS
+        && let Some([a, b]) = smallest_bigon(mesh, curves)
     {
-        swap(mesh, curves, a, b);
+        exchange(mesh, curves, a, b);
         removed += 1;
     }
     removed
 }
 
-/// A stretch of a curve, in its direction, from the first step of which on crossings belong to it up to the last.
+/// A stretch of a curve between two intersections, in the direction of the curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Stretch {
     curve: usize,
+    /// Its first mesh-edge crossing.
     from: usize,
-    /// How many crossings it has.
+    /// The number of its mesh-edge crossings.
     count: usize,
-    /// Whether it is to be passed backward to go as the other stretch does.
+    /// Whether it runs from the intersection of larger index to that of smaller index.
     backward: bool,
 }
 
-/// Two stretches between the same two meetings, if there are any that are short.
-fn bigon(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Option<[Stretch; 2]> {
-    let meetings = meetings(mesh, curves);
-    // The meetings along every curve, each with what lies there on the other side.
-    let mut along: Vec<Vec<(Place, usize)>> = vec![Vec::new(); curves.len()];
-    for (i, meeting) in meetings.iter().enumerate() {
-        for place in meeting {
-            along[place.curve].push((*place, i));
+/// The two stretches of the bigon with the fewest mesh-edge crossings, if that is small enough.
+fn smallest_bigon(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Option<[Stretch; 2]> {
+    let intersections = intersections(mesh, curves);
+    // The intersections along each curve: position and index.
+    let mut along: Vec<Vec<(CurvePosition, usize)>> = vec![Vec::new(); curves.len()];
+    for (i, positions) in intersections.iter().enumerate() {
+        for position in positions {
+            along[position.curve].push((*position, i));
         }
     }
     for list in &mut along {
         list.sort_by(|a, b| a.0.step.cmp(&b.0.step).then(a.0.t.total_cmp(&b.0.t)));
     }
-    // Every pair of meetings that follow each other on a curve, with the stretch between.
+    // The stretches between consecutive intersections of a curve, by the pair of intersections.
     let mut between: HashMap<[usize; 2], Vec<Stretch>> = HashMap::new();
     for (curve, list) in along.iter().enumerate() {
         let n = curves[curve].crossings.len();
@@ -86,24 +90,24 @@ fn bigon(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Option<[Stretch; 2]> {
     let mut found: Vec<[Stretch; 2]> = Vec::new();
     for list in between.values() {
         for (i, &a) in list.iter().enumerate() {
-            let fits = |b: &&Stretch| a.count + b.count <= LONGEST && apart(&a, b, curves);
+            let fits = |b: &&Stretch| a.count + b.count <= MAX_STRETCH_EDGES && disjoint(&a, b, curves);
             found.extend(list[i + 1..].iter().find(fits).map(|&b| [a, b]));
         }
     }
-    // The same whatever the order of the map.
+    // The minimum does not depend on the order of the map.
     found.into_iter().min_by_key(|[a, b]| (a.count + b.count, a.curve, a.from, b.curve, b.from))
 }
 
-/// Whether two stretches have no crossing in common.
-fn apart(a: &Stretch, b: &Stretch, curves: &[SurfaceCurve]) -> bool {
+/// Whether two stretches have no mesh-edge crossing in common, nor make up a whole curve.
+fn disjoint(a: &Stretch, b: &Stretch, curves: &[SurfaceCurve]) -> bool {
     let n = curves[a.curve].crossings.len();
     let within = |s: &Stretch, at: usize| (at + n - s.from) % n < s.count;
     a.curve != b.curve || (0..b.count).all(|k| !within(a, (b.from + k) % n)) && a.count + b.count < n
 }
 
-/// All places where curves cross, on either curve.
-fn meetings(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Vec<[Place; 2]> {
-    let mut in_face: HashMap<FaceId, Vec<Piece>> = HashMap::new();
+/// All intersections of curves, each as the position on both curves; by face.
+fn intersections(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Vec<[CurvePosition; 2]> {
+    let mut in_face: HashMap<FaceId, Vec<Chord>> = HashMap::new();
     for (curve, c) in curves.iter().enumerate() {
         let n = c.crossings.len();
         for step in usize::from(!c.closed)..n {
@@ -113,18 +117,18 @@ fn meetings(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Vec<[Place; 2]> {
                 Some(twin) => Crossing { halfedge: twin, t: 1.0 - before.t },
                 None => before,
             };
-            let ends = [from, to].map(on_border);
-            in_face.entry(mesh.face(to.halfedge)).or_default().push(Piece { curve, step, ends });
+            let ends = [from, to].map(in_reference_triangle);
+            in_face.entry(mesh.face(to.halfedge)).or_default().push(Chord { curve, step, ends });
         }
     }
     let mut faces: Vec<FaceId> = in_face.keys().copied().collect();
     faces.sort_unstable();
     let mut found = Vec::new();
-    for pieces in faces.iter().map(|f| &in_face[f]) {
-        for (i, p) in pieces.iter().enumerate() {
-            for q in &pieces[i + 1..] {
-                if let Some((s, t)) = meet(p.ends, q.ends) {
-                    found.push([(p, s), (q, t)].map(|(x, t)| Place { curve: x.curve, step: x.step, t }));
+    for chords in faces.iter().map(|f| &in_face[f]) {
+        for (i, p) in chords.iter().enumerate() {
+            for q in &chords[i + 1..] {
+                if let Some((s, t)) = chord_intersection(p.ends, q.ends) {
+                    found.push([(p, s), (q, t)].map(|(x, t)| CurvePosition { curve: x.curve, step: x.step, t }));
                 }
             }
         }
@@ -132,59 +136,61 @@ fn meetings(mesh: &TriMesh, curves: &[SurfaceCurve]) -> Vec<[Place; 2]> {
     found
 }
 
-/// A crossing in the plane of a triangle, whatever its shape: where pieces cross is the same in all.
-fn on_border(at: Crossing) -> DVec2 {
+/// A mesh-edge crossing on the border of the reference triangle. Whether chords intersect does not depend on the shape of
+/// the triangle.
+fn in_reference_triangle(at: Crossing) -> DVec2 {
     const CORNERS: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
     let i = at.halfedge.index() % 3;
     CORNERS[i].lerp(CORNERS[(i + 1) % 3], at.t)
 }
 
-/// Where two pieces cross, as fractions of them.
-fn meet([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<(f64, f64)> {
+/// Intersection of two chords, as fractions of them; `None` if they do not intersect.
+fn chord_intersection([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<(f64, f64)> {
     let (u, v) = (b - a, d - c);
     let turn = u.perp_dot(v);
     let (s, t) = ((c - a).perp_dot(v) / turn, (c - a).perp_dot(u) / turn);
     (s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0).then_some((s, t))
 }
 
-/// Lets each of two curves go the other's way.
-fn swap(mesh: &TriMesh, curves: &mut [SurfaceCurve], a: Stretch, b: Stretch) {
-    let taken = |s: &Stretch, backward: bool| -> Vec<Crossing> {
+/// Exchanges the stretches of two curves.
+fn exchange(mesh: &TriMesh, curves: &mut [SurfaceCurve], a: Stretch, b: Stretch) {
+    let crossings_of = |s: &Stretch, backward: bool| -> Vec<Crossing> {
         let list = &curves[s.curve].crossings;
-        let mut way: Vec<Crossing> = (0..s.count).map(|k| list[(s.from + k) % list.len()]).collect();
+        let mut taken: Vec<Crossing> = (0..s.count).map(|k| list[(s.from + k) % list.len()]).collect();
         if backward {
-            way.reverse();
-            // Inside the surface every edge has two sides.
-            way.iter_mut()
+            taken.reverse();
+            // A stretch between two intersections crosses no boundary edge, so each half-edge has a twin.
+            taken
+                .iter_mut()
                 .for_each(|c| *c = Crossing { halfedge: mesh.twin(c.halfedge).unwrap_or(c.halfedge), t: 1.0 - c.t });
         }
-        way
+        taken
     };
     let turned = a.backward != b.backward;
-    let (for_b, for_a) = (taken(&a, turned), taken(&b, turned));
-    let ways = [(a, for_a), (b, for_b)];
-    let mut names = vec![a.curve, b.curve];
-    names.dedup();
-    for curve in names {
-        let own: Vec<&(Stretch, Vec<Crossing>)> = ways.iter().filter(|(s, _)| s.curve == curve).collect();
+    let (for_b, for_a) = (crossings_of(&a, turned), crossings_of(&b, turned));
+    let replacements = [(a, for_a), (b, for_b)];
+    let mut affected = vec![a.curve, b.curve];
+    affected.dedup();
+    for curve in affected {
+        let own: Vec<&(Stretch, Vec<Crossing>)> = replacements.iter().filter(|(s, _)| s.curve == curve).collect();
         let SurfaceCurve { crossings, closed } = &curves[curve];
-        curves[curve].crossings = straightened(mesh, spliced(crossings, own), *closed);
+        curves[curve].crossings = without_backtracking(mesh, replace_stretches(crossings, own), *closed);
     }
 }
 
-/// Crossings with stretches replaced.
-fn spliced(crossings: &[Crossing], mut ways: Vec<&(Stretch, Vec<Crossing>)>) -> Vec<Crossing> {
+/// Crossings in which stretches are replaced by other crossings.
+fn replace_stretches(crossings: &[Crossing], mut replacements: Vec<&(Stretch, Vec<Crossing>)>) -> Vec<Crossing> {
     let n = crossings.len();
-    let begins = |s: &Stretch, k: usize| s.from == k || (k + n - s.from) % n < s.count;
-    // The first crossing of an open curve belongs to no stretch.
-    let start = (0..n).find(|&k| !ways.iter().any(|(s, _)| begins(s, k))).unwrap_or(0);
-    let mut new = Vec::with_capacity(n + LONGEST);
+    let contains = |s: &Stretch, k: usize| s.from == k || (k + n - s.from) % n < s.count;
+    // Start outside all stretches. The first crossing of an open curve belongs to no stretch.
+    let start = (0..n).find(|&k| !replacements.iter().any(|(s, _)| contains(s, k))).unwrap_or(0);
+    let mut new = Vec::with_capacity(n + MAX_STRETCH_EDGES);
     let mut k = 0;
     while k < n {
         let at = (start + k) % n;
-        if let Some(i) = ways.iter().position(|(s, _)| s.from == at) {
-            let (stretch, way) = ways.swap_remove(i);
-            new.extend_from_slice(way);
+        if let Some(i) = replacements.iter().position(|(s, _)| s.from == at) {
+            let (stretch, replacement) = replacements.swap_remove(i);
+            new.extend_from_slice(replacement);
             k += stretch.count;
         } else {
             new.push(crossings[at]);
@@ -194,17 +200,17 @@ fn spliced(crossings: &[Crossing], mut ways: Vec<&(Stretch, Vec<Crossing>)>) -> 
     new
 }
 
-/// Crossings without those that go over an edge and at once back again.
-fn straightened(mesh: &TriMesh, crossings: Vec<Crossing>, closed: bool) -> Vec<Crossing> {
-    let back = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
+/// Removes pairs of consecutive crossings over an edge and straight back.
+fn without_backtracking(mesh: &TriMesh, crossings: Vec<Crossing>, closed: bool) -> Vec<Crossing> {
+    let goes_back = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
     let mut kept: Vec<Crossing> = Vec::with_capacity(crossings.len());
     for c in crossings {
         match kept.last() {
-            Some(last) if back(last, &c) => drop(kept.pop()),
+            Some(last) if goes_back(last, &c) => drop(kept.pop()),
             _ => kept.push(c),
         }
     }
-    while closed && kept.len() > 2 && back(&kept[kept.len() - 1], &kept[0]) {
+    while closed && kept.len() > 2 && goes_back(&kept[kept.len() - 1], &kept[0]) {
         kept.pop();
         kept.remove(0);
     }
@@ -214,15 +220,15 @@ fn straightened(mesh: &TriMesh, crossings: Vec<Crossing>, closed: bool) -> Vec<C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::samples::torus;
     use crate::mesh::HalfedgeId;
+    use crate::testing::torus;
 
-    /// A closed curve once around a torus of `n` by `m` cells along row `j`, at `t` of each of the edges it crosses.
-    fn around(mesh: &TriMesh, first: HalfedgeId, t: impl Fn(usize) -> f64) -> SurfaceCurve {
+    /// The closed curve along a row of cells of a torus, from the half-edge `first` on, at the fraction `t` of each edge.
+    fn row_curve(mesh: &TriMesh, first: HalfedgeId, t: impl Fn(usize) -> f64) -> SurfaceCurve {
         let mut crossings = Vec::new();
         let mut h = first;
         loop {
-            // Alternately over the one and the other of the triangle's two other sides: straight along a row of cells.
+            // Alternately across one and the other of the two other sides of the triangle: straight along a row of cells.
             crossings.push(Crossing { halfedge: h, t: t(crossings.len()) });
             let g = mesh.twin(h).expect("closed");
             h = if crossings.len() % 2 == 1 { mesh.next(g) } else { mesh.prev(g) };
@@ -234,11 +240,11 @@ mod tests {
     }
 
     fn row(mesh: &TriMesh) -> HalfedgeId {
-        let closes = |h: &HalfedgeId| around_len(mesh, *h).is_some_and(|n| n >= 8);
+        let closes = |h: &HalfedgeId| row_length(mesh, *h).is_some_and(|n| n >= 8);
         mesh.halfedges().find(closes).expect("a row")
     }
 
-    fn around_len(mesh: &TriMesh, first: HalfedgeId) -> Option<usize> {
+    fn row_length(mesh: &TriMesh, first: HalfedgeId) -> Option<usize> {
         let mut h = first;
         for k in 1..200 {
             let g = mesh.twin(h)?;
@@ -251,32 +257,32 @@ mod tests {
     }
 
     fn count(mesh: &TriMesh, curves: &[SurfaceCurve]) -> usize {
-        meetings(mesh, curves).len()
+        intersections(mesh, curves).len()
     }
 
     #[test]
-    fn curves_beside_each_other_that_wriggle_are_pulled_apart() {
+    fn bigons_of_curves_side_by_side_are_removed() {
         let mesh = torus(8, 8);
         let first = row(&mesh);
         let along = |k: usize, off: f64| if k.is_multiple_of(2) { 0.5 + off } else { 0.5 - off };
-        let straight = around(&mesh, first, |k| along(k, 0.0));
-        let wriggling = around(&mesh, first, |k| along(k, if k % 5 < 2 { 0.1 } else { -0.1 }));
-        let mut curves = [straight, wriggling];
+        let straight = row_curve(&mesh, first, |k| along(k, 0.0));
+        let wavy = row_curve(&mesh, first, |k| along(k, if k % 5 < 2 { 0.1 } else { -0.1 }));
+        let mut curves = [straight, wavy];
         let before = count(&mesh, &curves);
         assert!(before >= 4 && before.is_multiple_of(2), "{before}");
         assert_eq!(remove_bigons(&mesh, &mut curves), before / 2);
         assert_eq!(count(&mesh, &curves), 0);
         curves.iter().for_each(|c| c.check(&mesh).expect("a curve"));
         let all: usize = curves.iter().map(|c| c.crossings.len()).sum();
-        assert_eq!(all, 2 * around_len(&mesh, first).expect("closes"));
+        assert_eq!(all, 2 * row_length(&mesh, first).expect("closes"));
     }
 
     #[test]
-    fn the_direction_of_a_curve_does_not_matter() {
+    fn the_direction_of_curves_does_not_matter() {
         let mesh = torus(8, 8);
         let first = row(&mesh);
-        let straight = around(&mesh, first, |_| 0.5);
-        let mut other = around(&mesh, first, |k| if k % 6 < 3 { 0.4 } else { 0.6 });
+        let straight = row_curve(&mesh, first, |_| 0.5);
+        let mut other = row_curve(&mesh, first, |k| if k % 6 < 3 { 0.4 } else { 0.6 });
         other.crossings.reverse();
         for c in &mut other.crossings {
             *c = Crossing { halfedge: mesh.twin(c.halfedge).expect("closed"), t: 1.0 - c.t };
@@ -290,16 +296,16 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_must_cross_still_do() {
+    fn necessary_crossings_remain() {
         let mesh = torus(8, 8);
         let first = row(&mesh);
-        // At different places of the edges: where both pass one they do not meet on it.
-        let straight = |h: HalfedgeId| around(&mesh, h, |_| if h == first { 0.5 } else { 0.4 });
-        // A row the other way around the torus.
-        let rows = mesh.halfedges().filter(|&h| around_len(&mesh, h).is_some());
+        // At different fractions of the edges, so that the curves do not cross on an edge.
+        let straight = |h: HalfedgeId| row_curve(&mesh, h, |_| if h == first { 0.5 } else { 0.4 });
+        // A row in the other direction around the torus.
+        let rows = mesh.halfedges().filter(|&h| row_length(&mesh, h).is_some());
         let across = rows.into_iter().find(|&h| count(&mesh, &[straight(first), straight(h)]) % 2 == 1);
-        let wriggling = |h: HalfedgeId, by: f64| around(&mesh, h, |k| if k % 3 == 0 { 0.5 - by } else { 0.5 + by });
-        let mut curves = [wriggling(first, 0.3), wriggling(across.expect("a row across"), 0.4)];
+        let wavy = |h: HalfedgeId, by: f64| row_curve(&mesh, h, |k| if k % 3 == 0 { 0.5 - by } else { 0.5 + by });
+        let mut curves = [wavy(first, 0.3), wavy(across.expect("a row across"), 0.4)];
         remove_bigons(&mesh, &mut curves);
         assert_eq!(count(&mesh, &curves), 1);
         curves.iter().for_each(|c| c.check(&mesh).expect("a curve"));

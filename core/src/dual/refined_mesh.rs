@@ -1,17 +1,7 @@
-//! A triangle mesh that is refined so that curves become paths of its edges.
+//! A triangle mesh under refinement, with marked edges.
 //!
-//! The only operations are splitting an edge and splitting a triangle at a new vertex. A path from vertex `p`
-//! to vertex `q` is drawn by splitting, in order, the edges it crosses: splitting an edge joins the new vertex
-//! to the corners opposite to it, and those are `p` or the vertex made just before, and the next one or `q`.
-//! So a drawn path never passes through an older vertex, two paths can only meet where one crosses an edge of
-//! the other, and every meeting is a transversal crossing of exactly two (D1 and D2 of Campen, section 5.1).
-//!
-//! Which edges a path crosses is found by a shortest path over triangles in which crossing an older path
-//! costs more than anything else. Coordinates only choose among routes that are equal in this respect, so
-//! rounding can make a path ugly but not wrong.
-
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+//! The only operations are splitting an edge and splitting a triangle at a new vertex. Marked edges are the paths of curves or
+//! layout arcs ([`super::path_insertion`]).
 
 use glam::{DVec2, DVec3};
 
@@ -31,16 +21,6 @@ pub enum Mark {
     Arc(u32),
 }
 
-/// A drawn path could not be continued: its ends are not joined by the triangles it may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no way from vertex {from} to vertex {to} through the triangles allowed")]
-pub struct NoPath {
-    /// Start vertex.
-    pub from: u32,
-    /// End vertex.
-    pub to: u32,
-}
-
 /// An oriented manifold triangle mesh under refinement.
 ///
 /// Half-edge `3 f + i` runs along side `i` of face `f`, as in [`TriMesh`].
@@ -48,7 +28,7 @@ pub struct NoPath {
 pub struct RefinedMesh {
     /// Position of each vertex.
     pub positions: Vec<DVec3>,
-    /// Free coordinates of each vertex, interpolated when edges are split.
+    /// Coordinates of each vertex, for the caller's use; interpolated when edges and faces are split.
     pub uv: Vec<DVec2>,
     origin: Vec<u32>,
     twin: Vec<u32>,
@@ -59,12 +39,12 @@ pub struct RefinedMesh {
     vertex_halfedge: Vec<u32>,
     /// Triangle of the original mesh that each face lies in.
     base_face: Vec<u32>,
-    /// A free label of each face, inherited when it is split.
+    /// A label of each face, for the caller's use; inherited when the face is split.
     pub tag: Vec<u32>,
 }
 
 impl RefinedMesh {
-    /// A copy of `mesh` with nothing drawn on it yet.
+    /// A copy of `mesh` without marks.
     pub fn new(mesh: &TriMesh) -> Self {
         let halfedges = || mesh.halfedges();
         Self {
@@ -102,7 +82,7 @@ impl RefinedMesh {
         self.origin[next(h) as usize]
     }
 
-    /// The corner opposite to a half-edge.
+    /// The vertex opposite to a half-edge in its triangle.
     #[inline]
     pub fn opposite(&self, h: u32) -> u32 {
         self.origin[prev(h) as usize]
@@ -134,7 +114,7 @@ impl RefinedMesh {
         self.base_face[f as usize]
     }
 
-    /// Whether a half-edge has a triangle on its own side only.
+    /// Whether a half-edge lies on the boundary, that is has no twin.
     #[inline]
     pub fn is_boundary(&self, h: u32) -> bool {
         self.twin[h as usize] == NONE
@@ -146,7 +126,7 @@ impl RefinedMesh {
         self.vertex_halfedge[v as usize]
     }
 
-    /// The outgoing half-edges of `v`, counter-clockwise; at the boundary beginning with the boundary one.
+    /// The outgoing half-edges of `v`, counter-clockwise; at the boundary, from the boundary half-edge on.
     pub fn outgoing(&self, v: u32) -> Vec<u32> {
         let start = self.vertex_halfedge[v as usize];
         let mut first = start;
@@ -180,7 +160,7 @@ impl RefinedMesh {
         list
     }
 
-    /// Half-edge from `a` to `b` or, where only that exists, from `b` to `a`.
+    /// Half-edge from `a` to `b`, or from `b` to `a` if only that exists.
     pub fn find(&self, a: u32, b: u32) -> Option<u32> {
         self.outgoing(a).into_iter().find_map(|h| {
             if self.target(h) == b {
@@ -193,7 +173,7 @@ impl RefinedMesh {
         })
     }
 
-    /// Marks an edge.
+    /// Sets the mark of an edge.
     pub fn set_mark(&mut self, h: u32, mark: Mark) {
         self.mark[h as usize] = mark;
         if let Some(t) = self.twin(h) {
@@ -201,9 +181,9 @@ impl RefinedMesh {
         }
     }
 
-    /// Splits the edge of `h` at fraction `t` of its way; returns the new vertex.
+    /// Splits the edge of `h` at the fraction `t` from its origin; returns the new vertex.
     ///
-    /// `h` then ends at the new vertex. Marks stay on both halves, and the two new edges across are free.
+    /// `h` then ends at the new vertex. Both halves keep the mark; the new edges to the opposite vertices are free.
     pub fn split_edge(&mut self, h: u32, t: f64) -> u32 {
         let (a, b) = (self.origin(h) as usize, self.target(h) as usize);
         let x = self.add_vertex(self.positions[a].lerp(self.positions[b], t), self.uv[a].lerp(self.uv[b], t));
@@ -247,7 +227,7 @@ impl RefinedMesh {
         far
     }
 
-    /// Splits a triangle at the mean of its corners; returns the new vertex.
+    /// Splits a triangle at the mean of its vertices; returns the new vertex.
     pub fn split_face(&mut self, f: u32) -> u32 {
         let [ha, hb, hc] = [3 * f, 3 * f + 1, 3 * f + 2];
         let [a, b, c] = [ha, hb, hc].map(|h| self.origin(h));
@@ -288,7 +268,7 @@ impl RefinedMesh {
         self.positions.len() as u32 - 1
     }
 
-    /// Appends a free-standing face cut out of `parent`; returns its first half-edge.
+    /// Appends a face without twins that is part of `parent`; returns its first half-edge.
     fn add_face(&mut self, corners: [u32; 3], parent: u32) -> u32 {
         let first = self.origin.len() as u32;
         self.origin.extend(corners);
@@ -300,120 +280,17 @@ impl RefinedMesh {
         first
     }
 
+    /// Makes two half-edges twins.
     fn join(&mut self, h: u32, g: u32) {
         self.twin[h as usize] = g;
         self.twin[g as usize] = h;
     }
 
-    /// Draws a path from `p` to `q` and marks its edges with `mark`; returns its vertices.
-    ///
-    /// The path uses triangles that `allowed` accepts, crosses as few marked edges as possible — none at all
-    /// if `barrier` holds for their mark — and stays close to the straight segment in the plane of `plane`.
+    /// The refined mesh as a triangle mesh, with the same numbering of vertices, faces and half-edges.
     ///
     /// # Errors
     ///
-    /// [`NoPath`] if the triangles allowed do not join the ends.
-    pub fn insert_path(
-        &mut self,
-        (p, q): (u32, u32),
-        mark: Mark,
-        allowed: impl Fn(&Self, u32) -> bool,
-        barrier: impl Fn(Mark) -> bool,
-        plane: impl Fn(&Self, u32) -> DVec2,
-    ) -> Result<Vec<u32>, NoPath> {
-        if let Some(h) = self.find(p, q)
-            && self.mark(h) == Mark::Free
-            && (allowed(self, h / 3) || self.twin(h).is_some_and(|t| allowed(self, t / 3)))
-        {
-            self.set_mark(h, mark);
-            return Ok(vec![p, q]);
-        }
-        let crossed = self.route((p, q), allowed, barrier, &plane).ok_or(NoPath { from: p, to: q })?;
-        let (start, end) = (plane(self, p), plane(self, q));
-        let mut path = vec![p];
-        for h in crossed {
-            let (a, b) = (plane(self, self.origin(h)), plane(self, self.target(h)));
-            let x = self.split_edge(h, meet(start, end, a, b));
-            path.push(x);
-        }
-        path.push(q);
-        for w in path.windows(2) {
-            let h = self.find(w[0], w[1]).ok_or(NoPath { from: w[0], to: w[1] })?;
-            self.set_mark(h, mark);
-        }
-        Ok(path)
-    }
-
-    /// The half-edges crossed on the way from `p` to `q`, each seen from the triangle that is entered: drawing
-    /// splits the triangle that is left before, so that only these keep their ids.
-    fn route(
-        &self,
-        (p, q): (u32, u32),
-        allowed: impl Fn(&Self, u32) -> bool,
-        barrier: impl Fn(Mark) -> bool,
-        plane: &impl Fn(&Self, u32) -> DVec2,
-    ) -> Option<Vec<u32>> {
-        let (start, end) = (plane(self, p), plane(self, q));
-        let scale = start.distance(end).max(f64::MIN_POSITIVE);
-        let mut best: HashMap<u32, (f64, u32)> = HashMap::new();
-        let mut heap = BinaryHeap::new();
-        for h in self.outgoing(p) {
-            let f = h / 3;
-            if allowed(self, f) {
-                best.insert(f, (0.0, NONE));
-                heap.push(Reverse((Cost(0.0), f)));
-            }
-        }
-        while let Some(Reverse((Cost(cost), f))) = heap.pop() {
-            if cost > best[&f].0 {
-                continue;
-            }
-            if (0..3).any(|i| self.origin(3 * f + i) == q) {
-                return Some(self.backtrack(f, &best));
-            }
-            for i in 0..3 {
-                let h = 3 * f + i;
-                let Some(t) = self.twin(h) else { continue };
-                let g = t / 3;
-                // A path leaves its first triangle through the side opposite to its start.
-                let leaves_badly = [self.origin(h), self.target(h)].iter().any(|&v| v == p || v == q);
-                if leaves_badly || !allowed(self, g) {
-                    continue;
-                }
-                let mark = self.mark(h);
-                if mark != Mark::Free && barrier(mark) {
-                    continue;
-                }
-                let (a, b) = (plane(self, self.origin(h)), plane(self, self.target(h)));
-                let away = distance_to_segment(start, end, a, b) / scale;
-                let price = cost + if mark == Mark::Free { 0.0 } else { CROSSING } + STEP + away.min(1e3);
-                if best.get(&g).is_none_or(|&(old, _)| price < old) {
-                    best.insert(g, (price, t));
-                    heap.push(Reverse((Cost(price), g)));
-                }
-            }
-        }
-        None
-    }
-
-    fn backtrack(&self, mut f: u32, best: &HashMap<u32, (f64, u32)>) -> Vec<u32> {
-        let mut crossed = Vec::new();
-        loop {
-            let h = best[&f].1;
-            let Some(left) = (h != NONE).then(|| self.twin(h)).flatten() else {
-                crossed.reverse();
-                return crossed;
-            };
-            crossed.push(h);
-            f = left / 3;
-        }
-    }
-
-    /// The mesh as it is now, with the same numbering of vertices, faces and half-edges.
-    ///
-    /// # Errors
-    ///
-    /// Only if the refinement is not a manifold any more, which would be a defect of this module.
+    /// Only if the refined mesh is not a manifold, which would be a defect of this module.
     pub fn to_mesh(&self) -> Result<TriMesh, TriMeshError> {
         let faces: Vec<[u32; 3]> = self.origin.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
         TriMesh::from_faces(self.positions.clone(), &faces)
@@ -426,24 +303,17 @@ impl RefinedMesh {
 
     /// The number of marked edges at `v`.
     pub fn marked_degree(&self, v: u32) -> usize {
-        let neighbours = self.outgoing(v);
-        let last = neighbours.last().map_or(NONE, |&h| prev(h));
+        let outgoing = self.outgoing(v);
+        let last = outgoing.last().map_or(NONE, |&h| prev(h));
         let closing = usize::from(last != NONE && self.is_boundary(last) && self.mark(last) != Mark::Free);
-        neighbours.iter().filter(|&&h| self.mark(h) != Mark::Free).count() + closing
+        outgoing.iter().filter(|&&h| self.mark(h) != Mark::Free).count() + closing
     }
 
-    /// The id of an original vertex, if `v` is one; `n_base` is the number of original vertices.
+    /// The vertex of the original mesh that `v` is, if it is one; `n_base` is the number of original vertices.
     pub fn base_vertex(&self, v: u32, n_base: usize) -> Option<VertexId> {
         ((v as usize) < n_base).then_some(VertexId(v))
     }
 }
-
-/// Price of crossing a marked edge: above the sum of all else that a route can cost.
-const CROSSING: f64 = 1e9;
-/// Price of one more triangle: small beside straying from the straight line, so that it only breaks ties.
-const STEP: f64 = 1e-3;
-/// How close to the end of an edge a path may cross it, as a fraction of the edge.
-const MARGIN: f64 = 0.02;
 
 /// Next half-edge around the triangle.
 #[inline]
@@ -457,22 +327,7 @@ pub fn prev(h: u32) -> u32 {
     if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }
 
-/// Where the line `p q` meets the segment `a b`, as a fraction of the way from `a` to `b`, kept off the ends.
-fn meet(p: DVec2, q: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let (d, e) = (q - p, b - a);
-    let t = (p - a).perp_dot(d) / e.perp_dot(d);
-    if t.is_finite() { t.clamp(MARGIN, 1.0 - MARGIN) } else { 0.5 }
-}
-
-/// Distance of the segment `a b` from the segment `p q`: zero where they cross.
-fn distance_to_segment(p: DVec2, q: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let d = q - p;
-    let (sa, sb) = (d.perp_dot(a - p), d.perp_dot(b - p));
-    let length = d.length().max(f64::MIN_POSITIVE);
-    if sa * sb <= 0.0 { 0.0 } else { sa.abs().min(sb.abs()) / length }
-}
-
-/// A finite price, ordered.
+/// A finite cost, ordered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cost(pub f64);
 
@@ -487,5 +342,52 @@ impl PartialOrd for Cost {
 impl Ord for Cost {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         self.0.total_cmp(&other.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::square;
+
+    #[test]
+    fn splitting_edges_and_faces_keeps_a_manifold() {
+        let mut mesh = RefinedMesh::new(&square(2));
+        mesh.tag[3] = 7;
+        let x = mesh.split_face(3);
+        assert_eq!((mesh.n_vertices(), mesh.n_faces(), mesh.outgoing(x).len()), (10, 10, 3));
+        assert!(mesh.outgoing(x).iter().all(|h| mesh.tag[*h as usize / 3] == 7 && mesh.base_face(h / 3) == 3));
+        let boundary = mesh.find(0, 1).unwrap();
+        let y = mesh.split_edge(boundary, 0.25);
+        assert_eq!((mesh.positions[y as usize], mesh.n_faces()), (DVec3::new(0.125, 0.0, 0.0), 11));
+        let inner = mesh.find(1, 4).unwrap();
+        let z = mesh.split_edge(inner, 0.5);
+        assert_eq!((mesh.outgoing(z).len(), mesh.n_faces()), (4, 13));
+        assert_eq!(mesh.to_mesh().unwrap().euler_characteristic(), 1);
+    }
+
+    #[test]
+    fn both_halves_of_a_split_edge_keep_its_mark() {
+        let mut mesh = RefinedMesh::new(&square(2));
+        let h = mesh.find(1, 4).unwrap();
+        mesh.set_mark(h, Mark::Curve(0));
+        let base = mesh.base_halfedge(h);
+        let x = mesh.split_edge(h, 0.5);
+        assert_eq!(mesh.marked_degree(x), 2);
+        for (a, b) in [(1, x), (x, 4)] {
+            let half = mesh.find(a, b).unwrap();
+            assert_eq!((mesh.mark(half), mesh.base_halfedge(half)), (Mark::Curve(0), base));
+        }
+    }
+
+    #[test]
+    fn neighbours_at_the_boundary_run_from_one_boundary_edge_to_the_other() {
+        let mesh = RefinedMesh::new(&square(2));
+        let neighbours = mesh.neighbours(1);
+        assert_eq!((neighbours[0], neighbours[neighbours.len() - 1]), (2, 0));
+        assert_eq!(mesh.neighbours(4).len(), 6);
+        // Only one direction of a boundary edge has a half-edge.
+        assert_eq!(mesh.find(0, 1), mesh.find(1, 0));
+        assert_eq!(mesh.find(0, 8), None);
     }
 }

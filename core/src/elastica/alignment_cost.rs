@@ -102,3 +102,51 @@ impl<'a> AlignmentCost<'a> {
         (ends + crossed).min(MAX_ALIGNMENT)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::square;
+
+    fn curvature(k_min: f64, k_max: f64, n: usize) -> Vec<PrincipalCurvature> {
+        vec![PrincipalCurvature { k_min, k_max, d_min: DVec3::X, d_max: DVec3::Y }; n]
+    }
+
+    #[test]
+    fn the_cost_is_zero_along_principal_directions_and_largest_between_them() {
+        let mesh = square(4);
+        let options = ElasticaOptions { aligned_boundary: false, ..ElasticaOptions::default() };
+        let curvature = curvature(-1.0, 3.0, mesh.n_vertices());
+        let cost = AlignmentCost::new(&mesh, &curvature, &vec![false; mesh.n_edges()], &options);
+        let v = VertexId(12);
+        assert_eq!([DVec3::X, -DVec3::X, DVec3::Y].map(|t| cost.at_vertex(v, t)), [0.0; 3]);
+        let diagonal = cost.at_vertex(v, (DVec3::X + DVec3::Y).normalize());
+        assert!((diagonal - (2f64.sqrt() - 1.0) * 4.0).abs() < 1e-12, "{diagonal}");
+        assert!(cost.at_vertex(v, DVec3::new(0.8, 0.6, 0.0)) < diagonal);
+    }
+
+    #[test]
+    fn curvatures_of_equal_size_have_no_preferred_direction() {
+        let mesh = square(4);
+        let curvature = curvature(-2.0, 2.0, mesh.n_vertices());
+        let options = ElasticaOptions::default();
+        let cost = AlignmentCost::new(&mesh, &curvature, &vec![false; mesh.n_edges()], &options);
+        assert_eq!(cost.at_vertex(VertexId(12), DVec3::new(0.8, 0.6, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn boundaries_are_crossed_at_a_right_angle_if_aligned() {
+        let mesh = square(4);
+        let curvature = curvature(0.0, 0.0, mesh.n_vertices());
+        let (sharp, v) = (vec![false; mesh.n_edges()], VertexId(2));
+        let mut options = ElasticaOptions::default();
+        let aligned = AlignmentCost::new(&mesh, &curvature, &sharp, &options);
+        assert!(aligned.at_vertex(v, DVec3::Y).abs() < 1e-9);
+        let along = aligned.at_vertex(v, DVec3::X);
+        assert_eq!(along, options.feature_weight * options.feature_cap);
+        let oblique = aligned.at_vertex(v, DVec3::new(0.5, 0.75f64.sqrt(), 0.0));
+        assert!(oblique > 0.0 && oblique < along);
+        options.aligned_boundary = false;
+        assert_eq!(AlignmentCost::new(&mesh, &curvature, &sharp, &options).at_vertex(v, DVec3::X), 0.0);
+    }
+}

@@ -44,3 +44,25 @@ impl SearchBudget<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_counts_up_to_its_limit() {
+        let progress = Progress::new();
+        let mut budget = SearchBudget { progress: &progress, limit: 2, settled: 0 };
+        assert_eq!([budget.count(), budget.count(), budget.count()], [Ok(()), Ok(()), Err(Stop::Spent)]);
+        assert_eq!(budget.settled, 2);
+    }
+
+    #[test]
+    fn a_cancelled_search_stops_at_the_next_check() {
+        let progress = Progress::new();
+        progress.cancel();
+        let mut budget = SearchBudget { progress: &progress, limit: u64::MAX, settled: 1 };
+        let counted = std::iter::from_fn(|| budget.count().ok()).count() as u64;
+        assert_eq!(counted, CHECK_EVERY - 1);
+    }
+}

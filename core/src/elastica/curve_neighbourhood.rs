@@ -1,56 +1,65 @@
 //! The vertices near a curve.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::{Dijkstra, TriMesh, VertexId};
 use crate::surface::SurfaceCurve;
 
 /// Memory for finding the vertices near curves, to be kept between them.
 #[derive(Debug, Default)]
 pub(super) struct CurveNeighbourhood {
-    /// Per vertex the distance; infinite between uses.
-    distance: Vec<f64>,
-    queue: BinaryHeap<Reverse<(u64, VertexId)>>,
+    /// A search over the given number of vertices.
+    search: Option<(usize, Dijkstra<VertexId, ()>)>,
 }
 
 impl CurveNeighbourhood {
     /// The vertices within `radius` of the ends of the edges that `curve` crosses, measured along edges; sorted by index.
     pub(super) fn of(&mut self, mesh: &TriMesh, curve: &SurfaceCurve, radius: f64) -> Vec<VertexId> {
-        if self.distance.len() != mesh.n_vertices() {
-            self.distance = vec![f64::INFINITY; mesh.n_vertices()];
-        }
-        let (distance, mut near) = (&mut self.distance, Vec::new());
+        let n = mesh.n_vertices();
+        let search = match self.search.take() {
+            Some((size, search)) if size == n => search,
+            _ => Dijkstra::new(n),
+        };
+        let (_, search) = self.search.insert((n, search));
         for v in curve.crossings.iter().flat_map(|c| [mesh.origin(c.halfedge), mesh.target(c.halfedge)]) {
-            if distance[v.index()] > 0.0 {
-                distance[v.index()] = 0.0;
-                near.push(v);
-                self.queue.push(Reverse((0, v)));
-            }
+            search.start(v, 0.0);
         }
-        // Distances are not negative, so their bits order like them.
-        while let Some(Reverse((key, v))) = self.queue.pop() {
-            let d = f64::from_bits(key);
-            if d > distance[v.index()] {
-                continue;
-            }
-            for h in mesh.outgoing(v) {
-                for (w, side) in [(mesh.target(h), h), (mesh.opposite(h), mesh.prev(h))] {
-                    let reached = d + mesh.vector(side).length();
-                    if reached < distance[w.index()] && reached <= radius {
-                        if distance[w.index()] == f64::INFINITY {
-                            near.push(w);
-                        }
-                        distance[w.index()] = reached;
-                        self.queue.push(Reverse((reached.to_bits(), w)));
-                    }
+        while let Some((v, d)) = search.settle() {
+            for (h, w) in mesh.spokes(v) {
+                let reached = d + mesh.vector(h).length();
+                if reached <= radius {
+                    search.reach(w, reached, ());
                 }
             }
         }
-        for v in &near {
-            distance[v.index()] = f64::INFINITY;
-        }
+        let mut near = search.reached().to_vec();
+        search.clear();
         near.sort_unstable();
         near
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{row, square, torus};
+
+    #[test]
+    fn radius_zero_gives_the_ends_of_the_crossed_edges() {
+        let mesh = torus(8, 6);
+        let mut memory = CurveNeighbourhood::default();
+        let near = memory.of(&mesh, &row(8, 2, true, 0.3), 0.0);
+        // The two rows of vertices beside the row of cells.
+        assert!(near.into_iter().eq((16..32).map(VertexId)));
+    }
+
+    #[test]
+    fn a_radius_of_the_whole_mesh_gives_all_vertices_and_leaves_no_trace() {
+        let mesh = square(4);
+        let mut memory = CurveNeighbourhood::default();
+        let curve = row(4, 1, false, 0.5);
+        let small = memory.of(&mesh, &curve, 0.1);
+        assert_eq!(memory.of(&mesh, &curve, 10.0).len(), mesh.n_vertices());
+        assert_eq!(memory.of(&mesh, &curve, 0.1), small);
+        // The memory fits itself to another mesh.
+        assert_eq!(memory.of(&torus(8, 6), &row(8, 2, true, 0.3), 10.0).len(), 48);
     }
 }

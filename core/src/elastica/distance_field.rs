@@ -172,3 +172,46 @@ impl DistanceField {
         path
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A field over some states without a graph.
+    fn field() -> DistanceField {
+        let mut field = DistanceField::default();
+        field.restart(4);
+        field
+    }
+
+    #[test]
+    fn a_restart_forgets_distances() {
+        let mut field = field();
+        field.add_source(2, 1.5);
+        assert_eq!((field.distance(2), field.min_key()), (1.5, 1.5));
+        field.restart(4);
+        assert_eq!((field.distance(2), field.min_key()), (f32::INFINITY, f32::INFINITY));
+        assert!(field.improves(2, 7.0));
+    }
+
+    #[test]
+    fn a_restart_clears_labels_when_search_numbers_run_out() {
+        let mut field = field();
+        field.add_source(1, 0.5);
+        field.number = 2;
+        field.restart(4);
+        assert_eq!(field.distance(1), f32::INFINITY);
+        assert!(field.improves(1, 1.0) && field.number > 2);
+    }
+
+    #[test]
+    fn only_a_smaller_distance_replaces_a_tentative_one() {
+        let mut field = field();
+        field.add_source(0, 2.0);
+        field.relax(0, 2.0, 3);
+        assert_eq!(field.parent(0), (NO_STATE, 0));
+        field.relax(0, 1.0, 3);
+        assert_eq!((field.distance(0), field.parent(0)), (1.0, (3, 0)));
+        assert!(!field.is_settled(0) && field.settled_distance(0) == f32::INFINITY);
+    }
+}

@@ -100,3 +100,30 @@ fn line_angle(difference: f64) -> f64 {
     let half_turns = difference / std::f64::consts::PI;
     (half_turns - half_turns.round()).abs() * std::f64::consts::PI
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+
+    #[test]
+    fn the_angle_of_lines_ignores_their_orientation() {
+        for (difference, expected) in [(0.0, 0.0), (PI, 0.0), (-0.3, 0.3), (PI - 0.3, 0.3), (-3.5 * PI, FRAC_PI_2)] {
+            assert!((line_angle(difference) - expected).abs() < 1e-12, "{difference}");
+        }
+    }
+
+    #[test]
+    fn angles_are_measured_in_the_plane_of_the_normal() {
+        let up = DVec3::new(0.0, 0.5, 4.0);
+        assert!((angle_from(DVec3::X, up, DVec3::Z) - FRAC_PI_2).abs() < 1e-12);
+        assert!((angle_from(DVec3::X, up, -DVec3::Z) + FRAC_PI_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_new_mask_closes_nothing() {
+        let mask = DirectionMask::none();
+        assert!(mask.is_empty() && mask.is_open(17) && mask.n_closed() == 0);
+    }
+}

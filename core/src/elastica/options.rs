@@ -77,3 +77,25 @@ pub enum ElasticaError {
     #[error("the mesh is too large for the elastica graph")]
     TooLarge,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_out_of_range_are_refused() {
+        let default = ElasticaOptions::default();
+        assert_eq!(default.check(), Ok(()));
+        let bad = [
+            ElasticaOptions { rings: 0, ..default },
+            ElasticaOptions { rings: 9, ..default },
+            ElasticaOptions { alpha: -1.0, ..default },
+            ElasticaOptions { beta: f64::NAN, ..default },
+            ElasticaOptions { max_turn: FRAC_PI_2 + 1e-9, ..default },
+            ElasticaOptions { feature_cap: -1.0, ..default },
+        ];
+        for options in bad {
+            assert_eq!(options.check(), Err(ElasticaError::BadOptions), "{options:?}");
+        }
+    }
+}

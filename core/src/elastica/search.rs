@@ -13,6 +13,7 @@
 //! Steps 1 and 2 need step costs that are symmetric under reversal: then one distance field from `v` serves both ways.
 
 use super::budget::{SearchBudget, Stop};
+use super::distance_field::DistanceField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::route::{ROUNDING, Route};
@@ -107,14 +108,8 @@ impl LoopSearch<'_> {
                 }
             });
         }
-        if let Some((before, e, after)) = meeting {
-            // The parent of the reverse of `e` was noted at the meeting: it may have changed since. Those of settled states
-            // have not.
-            let path_to = |s: State| if s == NO_STATE { Vec::new() } else { root.path_to(s) };
-            let mut states = path_to(before);
-            states.push(e);
-            states.extend(path_to(after).iter().rev().map(|&s| graph.reversed(s)));
-            *best = Some(Route { cost, states, closed: true });
+        if let Some(meeting) = meeting {
+            *best = Some(Route { cost, states: joined(graph, root, meeting), closed: true });
         }
         outcome
     }
@@ -191,4 +186,16 @@ impl LoopSearch<'_> {
     pub(super) fn limit_factor(&self) -> f32 {
         if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
     }
+}
+
+/// The loop of two paths that meet: from the start to the state `before`, on by `e`, and in reverse from the state `after`.
+///
+/// `after` is the parent of the reverse of `e` at the meeting. The label of that reverse may have changed since; those of
+/// settled states have not.
+fn joined(graph: &ElasticaGraph, root: &DistanceField, (before, e, after): (State, State, State)) -> Vec<State> {
+    let path_to = |s: State| if s == NO_STATE { Vec::new() } else { root.path_to(s) };
+    let mut states = path_to(before);
+    states.push(e);
+    states.extend(path_to(after).iter().rev().map(|&s| graph.reversed(s)));
+    states
 }

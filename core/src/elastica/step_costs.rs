@@ -174,3 +174,43 @@ fn step_terms(a: &DirectedGeodesic, b: &DirectedGeodesic, alpha: f32, beta: f32)
     let alignment = alpha * 0.5 * (a.alignment + b.alignment) * length;
     [length, alignment, beta * turn * turn / least]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn geodesic(out_angle: f32, back_angle: f32, length: f32, alignment: f32) -> DirectedGeodesic {
+        DirectedGeodesic { out_angle, back_angle, length, alignment }
+    }
+
+    #[test]
+    fn a_straight_step_costs_the_mean_length_and_alignment() {
+        let (a, b) = (geodesic(0.0, PI, 0.25, 2.0), geodesic(0.0, PI, 0.5, 4.0));
+        let [length, alignment, bending] = step_terms(&a, &b, 1.0, 0.25);
+        assert_eq!((length, alignment, bending), (0.375, 3.0 * 0.375, 0.0));
+    }
+
+    #[test]
+    fn a_turn_costs_as_in_the_source() {
+        let (beta, m) = (0.25, 0.1f64);
+        for degrees in [1.0f64, 10.0, 30.0] {
+            let turn = degrees.to_radians();
+            let (a, b) = (geodesic(0.0, PI, m as f32, 0.0), geodesic(turn as f32, 0.0, 0.3, 0.0));
+            let [length, _, bending] = step_terms(&a, &b, 1.0, beta as f32);
+            let expected = turn * m / (2.0 * (0.5 * turn).tan()) + 0.5 * (0.3 - m);
+            assert!((f64::from(length) - expected).abs() < 1e-6, "{degrees}°: {length}, expected {expected}");
+            assert!((f64::from(bending) - beta * turn * turn / m).abs() < 1e-5, "{degrees}°: {bending}");
+        }
+    }
+
+    #[test]
+    fn turns_are_measured_across_the_angle_zero() {
+        let from = |back_angle| geodesic(0.0, back_angle, 1.0, 0.0);
+        let to = |out_angle| geodesic(out_angle, 0.0, 1.0, 0.0);
+        // Straight on from 0.1 before half a turn is 0.1 before a full turn.
+        assert!((turn(&from(PI - 0.1), &to(0.05)) - 0.15).abs() < 1e-6);
+        assert!((turn(&from(PI + 0.1), &to(2.0 * PI - 0.05)) - 0.15).abs() < 1e-6);
+        // Straight back is half a turn.
+        assert_eq!(turn(&from(1.0), &to(1.0)), PI);
+    }
+}

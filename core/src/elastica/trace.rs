@@ -161,3 +161,54 @@ fn circles_one_vertex(mesh: &TriMesh, curve: &SurfaceCurve) -> bool {
     let Some(first) = curve.crossings.first() else { return true };
     ends(first).iter().any(|v| curve.crossings.iter().all(|c| ends(c).contains(v)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::VertexId;
+    use crate::testing::{row, square, torus};
+
+    fn back_over(mesh: &TriMesh, c: Crossing) -> Crossing {
+        Crossing { halfedge: mesh.twin(c.halfedge).unwrap(), t: 1.0 - c.t }
+    }
+
+    #[test]
+    fn crossings_straight_back_are_removed() {
+        let mesh = torus(8, 6);
+        let curve = row(8, 2, true, 0.4).crossings;
+        // Out and back over two edges, inside the list.
+        let mut detour = curve.clone();
+        let (h, g) = (curve[3], back_over(&mesh, curve[3]));
+        let inner = Crossing { halfedge: mesh.next(g.halfedge), t: 0.5 };
+        detour.splice(4..4, [inner, back_over(&mesh, inner)]);
+        assert_eq!(without_backtracking(&mesh, &detour, true), curve);
+        // The same across the ends of the list, which only a closed curve has.
+        let mut ends = curve.clone();
+        ends.insert(0, back_over(&mesh, h));
+        ends.push(h);
+        assert_eq!(without_backtracking(&mesh, &ends, true), curve);
+        assert_eq!(without_backtracking(&mesh, &ends, false), ends);
+    }
+
+    #[test]
+    fn a_curve_around_a_vertex_is_contractible_to_it() {
+        let mesh = torus(8, 6);
+        let crossings = mesh.outgoing(VertexId(9)).map(|h| Crossing { halfedge: h, t: 0.2 }).collect();
+        assert!(circles_one_vertex(&mesh, &SurfaceCurve { crossings, closed: true }));
+        assert!(!circles_one_vertex(&mesh, &row(8, 2, true, 0.4)));
+    }
+
+    #[test]
+    fn a_vertex_is_passed_on_the_left_unless_the_boundary_is_there() {
+        let mesh = square(4);
+        // Clockwise around an inner vertex.
+        let spokes: Vec<HalfedgeId> = mesh.outgoing(VertexId(12)).collect();
+        let passed = around_vertex(&mesh, spokes[2], spokes[1]).unwrap();
+        assert_eq!(passed, [Crossing { halfedge: spokes[2], t: PASSING }]);
+        // At a boundary vertex the last corner is reached from the first one counter-clockwise only.
+        let spokes: Vec<HalfedgeId> = mesh.outgoing(VertexId(2)).collect();
+        let passed = around_vertex(&mesh, spokes[0], spokes[1]).unwrap();
+        assert_eq!(passed, [Crossing { halfedge: mesh.prev(spokes[0]), t: 1.0 - PASSING }]);
+        assert_eq!(around_vertex(&mesh, spokes[0], spokes[0]), Some(Vec::new()));
+    }
+}

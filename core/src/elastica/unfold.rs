@@ -337,3 +337,79 @@ fn along_last_boundary_edge(mesh: &TriMesh, h: HalfedgeId) -> UnfoldedGeodesic {
     let position = DVec2::from_angle(mesh.corner_angle(h)) * length;
     UnfoldedGeodesic { target: mesh.origin(end), length, start: h, end, position, side: -position, window: ROOT }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::testing::{square, torus};
+
+    #[test]
+    fn geodesics_on_a_plane_are_straight_lines() {
+        let mesh = square(6);
+        let source = VertexId(3 * 7 + 3);
+        let mut unfolding = Unfolding::default();
+        let mut seen = vec![false; mesh.n_vertices()];
+        unfolding.all(
+            &mesh,
+            source,
+            |_| true,
+            |g| {
+                let distance = mesh.position(g.target).distance(mesh.position(source));
+                assert!((g.length - distance).abs() < 1e-12, "to {:?}: {} instead of {distance}", g.target, g.length);
+                seen[g.target.index()] = true;
+            },
+        );
+        assert_eq!(seen.iter().filter(|&&s| !s).count(), 1, "only the source has none");
+    }
+
+    #[test]
+    fn a_full_turn_of_tangent_angles_is_two_pi_inside_and_the_surface_angle_at_the_boundary() {
+        for (mesh, v, full) in [(torus(8, 6), VertexId(5), TAU), (square(4), VertexId(2), PI)] {
+            let corners = Corners::new(&mesh);
+            let last = mesh.outgoing(v).last().unwrap();
+            assert!((corners.tangent(&mesh, last, mesh.corner_angle(last)) - full).abs() < 1e-12);
+            for h in mesh.outgoing(v) {
+                let tangent = corners.tangent(&mesh, h, 0.1);
+                assert!((corners.local(&mesh, h, tangent) - 0.1).abs() < 1e-12);
+                assert_eq!(corners.locate(&mesh, v, tangent).0, h);
+            }
+        }
+    }
+
+    #[test]
+    fn a_geodesic_is_found_again_by_its_angle_and_length() {
+        let mesh = torus(10, 8);
+        let (corners, v) = (Corners::new(&mesh), VertexId(12));
+        let mut all = Vec::new();
+        let mut unfolding = Unfolding::default();
+        unfolding.all(&mesh, v, |w| mesh.position(w).distance(mesh.position(v)) < 0.2, |g| all.push(g));
+        for g in all.iter().filter(|g| !g.is_edge()) {
+            let angle = corners.tangent(&mesh, g.start, g.start_angle());
+            let again = unfolding.towards(&mesh, &corners, v, g.target, (angle, g.length), 1e-6).unwrap();
+            assert_eq!((again.start, again.end, again.target), (g.start, g.end, g.target));
+        }
+        assert!(all.iter().any(|g| !g.is_edge()));
+        let known = (0.0, 100.0);
+        assert!(unfolding.towards(&mesh, &corners, v, VertexId(13), known, 1e-6).is_none());
+    }
+
+    #[test]
+    fn crossings_of_a_geodesic_lie_on_it() {
+        let mesh = square(6);
+        let mut unfolding = Unfolding::default();
+        let mut found = Vec::new();
+        unfolding.all(&mesh, VertexId(0), |_| true, |g| found.push(g));
+        let g = found.iter().find(|g| g.target == VertexId(2 * 7 + 5)).unwrap();
+        let [a, b] = [VertexId(0), g.target].map(|v| mesh.position(v));
+        let crossings = unfolding.crossings(g);
+        assert!(!crossings.is_empty());
+        for c in crossings {
+            let x = mesh.position(mesh.origin(c.halfedge)).lerp(mesh.position(mesh.target(c.halfedge)), c.t);
+            assert!(
+                (x.distance(a) - c.distance).abs() < 1e-12 && (x.distance(a) + x.distance(b) - g.length).abs() < 1e-12
+            );
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! The searches against plain Dijkstra, and the curves they return, on sample, random and research meshes.
 
 mod anchored_loops;
+mod graph;
 mod loop_search;
 mod open_curves;
 mod proposals;

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::elastica::budget::SearchBudget;
-use crate::elastica::graph::{ElasticaGraph, State};
+use crate::elastica::graph::{ElasticaGraph, NO_STATE, State};
 use crate::elastica::open_curves::{BoundarySearch, BoundarySearchMemory};
 use crate::elastica::route::{ROUNDING, Route};
 use crate::elastica::search::LoopSearch;
@@ -21,9 +21,18 @@ pub(super) fn same_cost(a: f32, b: f32) -> bool {
     a == b || (a - b).abs() <= TOLERANCE * b
 }
 
-/// Plain Dijkstra from `a` to every state, by at least one step. So `distances(a)[a]` is the cost of the cheapest loop that
-/// starts with `a`.
+/// Plain Dijkstra from `a` to every state, by at least one step.
 pub(super) fn distances(graph: &ElasticaGraph, mask: &DirectionMask, a: State) -> Vec<f32> {
+    dijkstra(graph, mask, a, NO_STATE)
+}
+
+/// The cost of the cheapest loop that starts with `a`.
+pub(super) fn cheapest_loop(graph: &ElasticaGraph, mask: &DirectionMask, a: State) -> f32 {
+    dijkstra(graph, mask, a, a)[a as usize]
+}
+
+/// Distances from `a` by at least one step, until `last` is settled.
+fn dijkstra(graph: &ElasticaGraph, mask: &DirectionMask, a: State, last: State) -> Vec<f32> {
     let mut distance = vec![f32::INFINITY; graph.n_states()];
     let mut queue = BinaryHeap::new();
     let mut from = (0.0, a);
@@ -38,6 +47,9 @@ pub(super) fn distances(graph: &ElasticaGraph, mask: &DirectionMask, a: State) -
         }
         from = loop {
             let Some(Reverse((key, e))) = queue.pop() else { return distance };
+            if e == last {
+                return distance;
+            }
             if f32::from_bits(key) <= distance[e as usize] {
                 break (f32::from_bits(key), e);
             }
@@ -67,7 +79,7 @@ pub(super) fn compare_loops(graph: &ElasticaGraph, mask: &DirectionMask, v: Vert
     let mut routes = Vec::new();
     search.in_all_directions(None, &mut routes, |_, _| {}).unwrap();
     let out: Vec<State> = graph.outgoing(v).filter(|&a| mask.is_open(a)).collect();
-    let expected: Vec<f32> = out.iter().map(|&a| distances(graph, mask, a)[a as usize]).collect();
+    let expected: Vec<f32> = out.iter().map(|&a| cheapest_loop(graph, mask, a)).collect();
     for r in &routes {
         assert!(r.closed && r.states.iter().all(|&e| mask.is_open(e)) && graph.origin(r.states[0]) == v);
         let cost = cost_of_steps(graph, r);

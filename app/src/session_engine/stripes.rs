@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn a_wide_strip_has_at_most_as_many_lines_as_the_renderer_counts() {
-        let strip = StripCoverage { curve: 0, bounds: [10.0, 1e-6], faces: 1 };
+        let strip = StripCoverage { curve: 0, widths: [10.0, 1e-6], faces: 1 };
         let Stripes { at, reach } = stripes(&strip, [10.0, 0.0, 0.0]);
         assert_eq!((reach, at[0]), ([120, 1], 120.0));
     }

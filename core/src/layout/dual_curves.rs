@@ -38,7 +38,7 @@ pub enum DualCurvesError {
     },
     /// There is no path for a dual curve.
     #[error("no path for a dual curve in patch {patch}: {source}")]
-    Draw {
+    Path {
         /// The patch.
         patch: usize,
         /// Where the path ends.
@@ -194,7 +194,7 @@ impl DualPatch {
                 return Err(PatchShapeError::Sides { patch: p }.into());
             };
             mesh.insert_path((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
-                .map_err(|source| DualCurvesError::Draw { patch: p, source })?;
+                .map_err(|source| DualCurvesError::Path { patch: p, source })?;
         }
         Ok(Self { mesh, parent: submesh.whole, faces })
     }

@@ -45,7 +45,7 @@ pub enum InitialEmbeddingError {
     },
     /// There is no path for a half arc.
     #[error("no path for an arc in region {region}: {source}")]
-    Draw {
+    Path {
         /// The region.
         region: usize,
         /// Where the path ends.
@@ -167,7 +167,7 @@ impl RegionPart {
             let middle = middle.ok_or(InitialEmbeddingError::Halves { arc: segment as usize })?;
             let path = mesh
                 .insert_path((node, middle), Mark::Arc(segment), |_, _| true, |_| true, |m, v| m.uv[v as usize])
-                .map_err(|source| InitialEmbeddingError::Draw { region: r, source })?;
+                .map_err(|source| InitialEmbeddingError::Path { region: r, source })?;
             halves.push((segment, forward, path));
         }
         if let Some(k) = stretch {

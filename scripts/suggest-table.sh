@@ -19,9 +19,9 @@ for mesh in "$@"; do
   report="$out/w/report.json"
   value() { grep -m1 -oE "\"$1\": [0-9]+" "$report" | grep -oE '[0-9]+$'; }
   if [ -f "$report" ] && grep -q '"valid": true' "$report"; then
-    strips=$(grep -c '"cost":' "$report")
+    strips=$(grep -c '"elastica_cost":' "$report")
     note=$(grep -o 'stopped early.*' <<<"$message" | head -n 1)
-    echo "| $name | $(value faces) | $strips | $(value patches) | $(value irregular) | $(value red) | $seconds | $note |"
+    echo "| $name | $(value faces) | $strips | $(value patches) | $(value irregular_nodes) | $(value red) | $seconds | $note |"
   else
     echo "| $name | | | | | | $seconds | $(grep -v XDG <<<"$message" | head -n 1) |"
   fi

@@ -1,6 +1,6 @@
-// What lies over the surface: the backdrop with the finished surface image, lines and markers of a width in
-// pixels. They test themselves against the depth of the surface at their centre line, so that a wide line is
-// visible or hidden as a whole, with a soft passage between.
+// Composes the image of the surface with the backdrop, and draws lines and markers of constant width on the screen.
+// Lines and markers compare the depth at their centre line with that of the surface. So a wide line is visible or
+// hidden across its whole width, with a smooth transition.
 
 struct View {
     clip_from_world: mat4x4f,
@@ -38,7 +38,7 @@ fn image_fragment(in: ImageVarying) -> @location(0) vec4f {
     let surface = textureLoad(surface_image, pixel, 0);
     let across = (in.uv.x - 0.5) * 0.35;
     var backdrop = mix(BACKDROP_TOP, BACKDROP_BOTTOM, smoothstep(0.0, 1.0, in.uv.y + across * across));
-    // Half a step of noise keeps the gradient free of bands.
+    // Noise of half a colour step prevents banding of the gradient.
     let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715)))) - 0.5;
     backdrop += noise / 255.0;
     return vec4f(surface.rgb + backdrop * (1.0 - surface.a), 1.0);
@@ -53,17 +53,17 @@ fn view_distance(depth: f32) -> f32 {
     return near * far / max(far - depth * (far - near), 1e-9);
 }
 
-// How much of a point at `pixel` with `depth` stands before the surface, from 0 to 1.
+// The share of samples at `pixel` where a point of this `depth` is in front of the surface.
 fn visible(pixel: vec2f, depth: f32) -> f32 {
     let last = vec2i(view.size_and_planes.xy) - vec2i(1);
     let at = clamp(vec2i(pixel), vec2i(0), last);
     let distance = view_distance(depth);
-    // The line is a chord of the true curve and the surface a facet: allow it to lie a little below.
-    let slack = 0.0015 + 0.004 * distance;
+    // Lines and triangles approximate curved shapes, so a line may lie a little below the surface.
+    let tolerance = 0.0015 + 0.004 * distance;
     var sum = 0.0;
     for (var sample = 0; sample < 4; sample++) {
         let surface = view_distance(textureLoad(surface_depth, at, sample));
-        sum += 1.0 - smoothstep(slack, 2.0 * slack, distance - surface);
+        sum += 1.0 - smoothstep(tolerance, 2.0 * tolerance, distance - surface);
     }
     return 0.25 * sum;
 }
@@ -86,8 +86,8 @@ struct Segment {
     @location(1) start: vec3f,
     @location(2) end: vec3f,
     @location(3) after: vec3f,
-    @location(4) color: vec4f,
-    // Width in points; how much of the colour hidden parts keep.
+    @location(4) colour: vec4f,
+    // Width in points; relative opacity of hidden parts.
     @location(5) style: vec2f,
 }
 
@@ -97,7 +97,7 @@ struct LineVarying {
     @location(1) @interpolate(flat) start: vec3f,
     @location(2) @interpolate(flat) end: vec3f,
     @location(3) @interpolate(flat) neighbours: vec4f,
-    @location(4) @interpolate(flat) color: vec4f,
+    @location(4) @interpolate(flat) colour: vec4f,
     @location(5) @interpolate(flat) style: vec2f,
 }
 
@@ -108,7 +108,7 @@ fn line_vertex(in: Segment, @builtin(vertex_index) index: u32) -> LineVarying {
     var b = view.clip_from_world * vec4f(in.end, 1.0);
     var out: LineVarying;
     if a.w < near && b.w < near {
-        // Behind the viewer: a triangle without area.
+        // Behind the eye: a degenerate triangle, which is not drawn.
         out.clip = vec4f(0.0, 0.0, 0.0, 1.0);
         return out;
     }
@@ -132,12 +132,12 @@ fn line_vertex(in: Segment, @builtin(vertex_index) index: u32) -> LineVarying {
     out.start = vec3f(start, a.z / a.w);
     out.end = vec3f(end, b.z / b.w);
     out.neighbours = vec4f(to_pixel(p), to_pixel(n));
-    out.color = in.color;
+    out.colour = in.colour;
     out.style = in.style;
     return out;
 }
 
-// Where along the segment the nearest point lies, from 0 to 1, and the distance to it.
+// The parameter (0 to 1) of the point of a segment nearest to `p`, and its distance.
 fn nearest(p: vec2f, a: vec2f, b: vec2f) -> vec2f {
     let ab = b - a;
     let t = clamp(dot(p - a, ab) / max(dot(ab, ab), 1e-6), 0.0, 1.0);
@@ -147,12 +147,12 @@ fn nearest(p: vec2f, a: vec2f, b: vec2f) -> vec2f {
 @fragment
 fn line_fragment(in: LineVarying) -> @location(0) vec4f {
     let here = nearest(in.pixel, in.start.xy, in.end.xy);
-    // Each pixel belongs to the nearest of neighbouring segments: no beads where half-covering joints overlap.
+    // Each pixel belongs to the nearest segment, so that transparent joints are not drawn twice.
     let before = nearest(in.pixel, in.neighbours.xy, in.start.xy);
     let after = nearest(in.pixel, in.end.xy, in.neighbours.zw);
     let has_before = distance(in.neighbours.xy, in.start.xy) > 1e-3;
     let has_after = distance(in.neighbours.zw, in.end.xy) > 1e-3;
-    // Where both are equally near, round an outer corner, the later one draws.
+    // At equal distance, around an outer corner, the later segment draws the pixel.
     let later_nearer = after.y < here.y - 1e-4 || (after.y < here.y + 1e-4 && here.x >= 1.0);
     if (has_before && before.y < here.y - 1e-4) || (has_after && later_nearer) {
         discard;
@@ -160,16 +160,16 @@ fn line_fragment(in: LineVarying) -> @location(0) vec4f {
     let cover = clamp(0.5 * in.style.x * view.toggles.w + 0.5 - here.y, 0.0, 1.0);
     let centre = mix(in.start, in.end, here.x);
     let seen = visible(centre.xy, centre.z);
-    let alpha = in.color.a * cover * mix(in.style.y, 1.0, seen);
-    return vec4f(in.color.rgb * alpha, alpha);
+    let alpha = in.colour.a * cover * mix(in.style.y, 1.0, seen);
+    return vec4f(in.colour.rgb * alpha, alpha);
 }
 
 // ---- markers ----
 
 struct Marker {
     @location(0) position: vec3f,
-    @location(1) color: vec4f,
-    // Radius in points; how much of the colour hidden markers keep; 1 for a square with a pale core, else 0.
+    @location(1) colour: vec4f,
+    // Radius in points; relative opacity when hidden; 1 for a square with a light core, else 0.
     @location(2) style: vec3f,
 }
 
@@ -177,7 +177,7 @@ struct MarkerVarying {
     @builtin(position) clip: vec4f,
     @location(0) offset: vec2f,
     @location(1) @interpolate(flat) centre: vec3f,
-    @location(2) @interpolate(flat) color: vec4f,
+    @location(2) @interpolate(flat) colour: vec4f,
     @location(3) @interpolate(flat) style: vec3f,
 }
 
@@ -194,7 +194,7 @@ fn marker_vertex(in: Marker, @builtin(vertex_index) index: u32) -> MarkerVarying
     out.offset = corner * reach;
     out.centre = vec3f(to_pixel(centre), centre.z / centre.w);
     out.clip = to_clip(out.centre.xy + out.offset);
-    out.color = in.color;
+    out.colour = in.colour;
     out.style = in.style;
     return out;
 }
@@ -206,10 +206,10 @@ fn marker_fragment(in: MarkerVarying) -> @location(0) vec4f {
     let square = in.style.z > 0.5;
     let distance = select(round, max(abs(in.offset.x), abs(in.offset.y)), square);
     let outer = clamp(radius + 0.5 - distance, 0.0, 1.0);
-    // A pale ring keeps the disc apart from the lines that meet in it.
+    // A light ring separates the disc from the lines that meet there.
     let inner = clamp(radius - 1.25 * view.toggles.w + 0.5 - distance, 0.0, 1.0);
     let core = select(0.0, clamp(0.34 * radius + 0.5 - round, 0.0, 1.0), square);
-    let rgb = mix(vec3f(1.0), in.color.rgb, inner * (1.0 - core));
-    let alpha = in.color.a * outer * mix(in.style.y, 1.0, visible(in.centre.xy, in.centre.z));
+    let rgb = mix(vec3f(1.0), in.colour.rgb, inner * (1.0 - core));
+    let alpha = in.colour.a * outer * mix(in.style.y, 1.0, visible(in.centre.xy, in.centre.z));
     return vec4f(rgb * alpha, alpha);
 }

@@ -1,5 +1,5 @@
-// The surface: lit so that its shape shows, washed with the colour of its region, striped where strips cover it.
-// Drawn into the offscreen target in display (gamma) space; clear pixels keep alpha 0 for the backdrop.
+// Draws the surface with lighting, the colours of its regions and the stripes of its strips. The output is in display
+// (gamma) space, with alpha 0 where there is no surface.
 
 struct View {
     clip_from_world: mat4x4f,
@@ -8,7 +8,7 @@ struct View {
     eye: vec4f,
     // Width and height in pixels, distance of the near and of the far plane.
     size_and_planes: vec4f,
-    // Stripes on, wireframe on, region tint on, pixels per point.
+    // 1 or 0 for stripes, wireframe and tint; pixels per point.
     toggles: vec4f,
 }
 
@@ -17,11 +17,11 @@ struct View {
 struct Vertex {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    // Colour of the region; alpha is how strongly it washes over the material.
+    // Colour over the material; alpha is its strength.
     @location(2) tint: vec4f,
-    // Across strips of both families; a line runs wherever a coordinate is a whole number.
+    // Stripe coordinates of both families; lines are drawn at integers.
     @location(3) stripe: vec2f,
-    // Up to which coordinate and down to which negative one the strip reaches, of the first and the second family.
+    // Largest coordinate of the strip and negated smallest, for the first and the second family.
     @location(4) reach: vec4u,
 }
 
@@ -58,8 +58,8 @@ fn view_direction(x: f32, y: f32, z: f32) -> vec3f {
     return normalize(x * view.view_axes[0].xyz + y * view.view_axes[1].xyz + z * view.view_axes[2].xyz);
 }
 
-// How much of a pixel a strip covers (x), and the lines of `width` pixels along it (y): they run where `coordinate`
-// is whole, up to and with the ends of the strip, and fade to their mean where they are too dense.
+// Coverage of a pixel by a strip (x) and by its lines (y). Lines of `width` pixels lie at integers of `coordinate`,
+// both ends of the strip included. Lines too dense for the screen fade to their mean.
 fn stripes(coordinate: f32, reach: vec2f, width: f32) -> vec2f {
     let per_pixel = max(length(vec2f(dpdx(coordinate), dpdy(coordinate))), 1e-6);
     let to_end = min(reach.x - coordinate, coordinate + reach.y) / per_pixel;
@@ -81,7 +81,7 @@ fn decode(c: vec3f) -> vec3f {
 
 @fragment
 fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    // Derivatives first, while control flow is still uniform.
+    // Derivatives must be taken in uniform control flow.
     let width = 1.15 * view.toggles.w;
     let stripes_u = stripes(in.stripe.x, in.reach.xy, width) * view.toggles.x;
     let stripes_v = stripes(in.stripe.y, in.reach.zw, width) * view.toggles.x;
@@ -91,13 +91,13 @@ fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0
     var normal = normalize(in.normal);
     if !front { normal = -normal; }
 
-    // The material washed by the region, then by the strips.
+    // The material, under the colour of the region and that of the strips.
     var albedo = select(BACK_MATERIAL, MATERIAL, front);
     albedo = mix(albedo, decode(in.tint.rgb), in.tint.a * view.toggles.z);
     albedo = mix(albedo, STRIPE, 0.10 * (stripes_u.x + stripes_v.x));
     albedo = mix(albedo, STRIPE, 0.72 * (1.0 - (1.0 - stripes_u.y) * (1.0 - stripes_v.y)));
 
-    // Hemisphere, a key light over the viewer's left shoulder, a fill from the right, a rim from behind.
+    // Hemisphere light, key light from the upper left, fill light from the right, rim light from behind.
     let up = view.view_axes[1].xyz;
     let hemisphere = mix(GROUND, SKY, 0.5 + 0.5 * dot(normal, up)) * 0.44;
     let key = max(dot(normal, view_direction(-0.45, 0.65, 0.75)), 0.0) * 0.68;
@@ -106,7 +106,7 @@ fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0
     let rim = pow(1.0 - facing, 3.5) * max(dot(normal, view_direction(0.35, 0.75, -0.35)) + 0.25, 0.0) * 0.30;
     let half_way = normalize(view_direction(-0.45, 0.65, 0.75) + toward_eye);
     let gloss = pow(max(dot(normal, half_way), 0.0), 42.0) * 0.09;
-    // Turning away darkens a little: a soft outline that lets neighbouring limbs stand apart.
+    // Surfaces at grazing angles are darker, which separates parts that overlap on the screen.
     let shade = mix(0.74, 1.0, smoothstep(0.0, 0.55, facing));
     var colour = albedo * (hemisphere + (key + fill) * vec3f(1.03, 1.0, 0.96)) * shade + rim * vec3f(0.9, 0.95, 1.0) + gloss;
 

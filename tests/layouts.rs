@@ -1,14 +1,15 @@
-//! Woven and made layouts on whole surfaces: the field's topology, descent, alignment, collapsed and rounded chords.
+//! Woven and constructed layouts on whole surfaces: topology of the field, descent, alignment, collapsed and rounded chords.
 
 mod support;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{self, Mutex, OnceLock};
 
 use glam::DVec3;
 use plait_core::dual::{Mark, RefinedMesh};
 use plait_core::embed::{
     ArcHeadings, EmbeddingError, EmbeddingTopology, Next, OptimisedEmbedding, Optimiser, Problem, Settings, Snapshot,
-    Surface, arc_headings, optimise,
+    Surface, arc_headings, optimise_embedding,
 };
 use plait_core::field::indices;
 use plait_core::layout::{Arc, DualCurve, Embedding, Node, Patch, QuadLayout, carry, map_patches, redraw};
@@ -16,58 +17,72 @@ use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::proxy::Proxy;
 use plait_core::quad::{Spacing, integer_grid_counts, refine};
-use plait_core::surface::Metric;
-use plait_core::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
+use plait_core::surface::{Metric, PrincipalCurvature, SurfaceIndex, SurfacePoint, principal_curvature};
 use plait_core::weave::{Goal, InitialLayout, Options, Script, Session, initial_layout, replay};
-use support::{meshes, root};
+use support::replay::script;
 
-/// A weave script replayed; `None` where its mesh is missing.
-fn woven(name: &str) -> Option<(Session, InitialLayout)> {
-    meshes()?;
-    let path = root().join("tests/scripts").join(name).with_extension("json");
-    let script = Script::read(&path).unwrap();
-    let session = replay(&script, path.parent().unwrap(), &Progress::new()).unwrap();
-    let drawn = initial_layout(&session, &Progress::new()).unwrap();
-    Some((session, drawn))
+/// A woven layout.
+struct Woven {
+    session: Session,
+    initial: InitialLayout,
+}
+
+/// A weave script replayed, once for all tests; `None` where its mesh is missing.
+fn woven(name: &str) -> Option<sync::Arc<Woven>> {
+    type Slot = sync::Arc<OnceLock<Option<sync::Arc<Woven>>>>;
+    static SLOTS: Mutex<BTreeMap<String, Slot>> = Mutex::new(BTreeMap::new());
+    let slot = sync::Arc::clone(SLOTS.lock().unwrap_or_else(|e| e.into_inner()).entry(name.to_owned()).or_default());
+    let replay_once = || {
+        let path = script(name);
+        let script = Script::read(&path).unwrap();
+        if let MeshSource::File(file) = MeshSource::from_name(&script.mesh) {
+            support::mesh(&file.file_name()?.to_string_lossy())?;
+        }
+        let session = replay(&script, path.parent().unwrap(), &Progress::new()).unwrap();
+        let initial = initial_layout(&session, &Progress::new()).unwrap();
+        Some(sync::Arc::new(Woven { session, initial }))
+    };
+    slot.get_or_init(replay_once).clone()
 }
 
 /// The end of an arc: the corner at its node, and the heading of the arc away from the node in that triangle.
-fn end(net: &EmbeddingTopology, arc: u32, second: bool) -> (HalfedgeId, i32) {
-    let arc = &net.arcs[arc as usize];
+fn end(topology: &EmbeddingTopology, arc: u32, second: bool) -> (HalfedgeId, i32) {
+    let arc = &topology.arcs[arc as usize];
     if !second {
         return (arc.start, i32::from(arc.heading));
     }
-    let turns: i32 = arc.crossed.iter().map(|&h| net.jump_across(h)).sum();
+    let turns: i32 = arc.crossed.iter().map(|&h| topology.jump_across(h)).sum();
     (arc.end, i32::from(arc.heading) - turns + 2)
 }
 
 #[test]
-fn the_field_turns_as_the_layout_says_on_every_surface() {
+fn the_field_has_the_topology_of_the_layout() {
     for name in ["cino_3holes", "pretzel", "fertility_13k", "vase_open", "sleeve", "aqua_center"] {
-        let Some((session, InitialLayout { layout, embedding, .. })) = woven(name) else { return };
+        let Some(woven) = woven(name) else { continue };
+        let (session, InitialLayout { layout, embedding, .. }) = (&woven.session, &woven.initial);
         let surface = &session.model().mesh;
-        let net = EmbeddingTopology::new(surface, &embedding, &layout, &arc_headings(&layout)).unwrap();
-        // Around nodes as their valences say, around every other vertex not at all.
-        let metric = Metric::new(&net.mesh);
-        let found = indices(&net.mesh, &metric, &net.angle, &net.jump);
-        let mut wanted = vec![0; net.mesh.n_vertices()];
-        net.nodes.iter().for_each(|n| wanted[n.vertex.index()] = n.index());
-        for v in net.mesh.vertices().filter(|&v| !net.mesh.is_boundary_vertex(v)) {
+        let topology = EmbeddingTopology::new(surface, embedding, layout, &arc_headings(layout)).unwrap();
+        // Nodes have the index of their valence, other vertices none.
+        let metric = Metric::new(&topology.mesh);
+        let found = indices(&topology.mesh, &metric, &topology.angle, &topology.jump);
+        let mut wanted = vec![0; topology.mesh.n_vertices()];
+        topology.nodes.iter().for_each(|n| wanted[n.vertex.index()] = n.index());
+        for v in topology.mesh.vertices().filter(|&v| !topology.mesh.is_boundary_vertex(v)) {
             assert_eq!(found[v.index()], wanted[v.index()], "{name}: {v:?}");
         }
-        let sum: i32 = net.nodes.iter().map(|n| n.index()).sum();
+        let sum: i32 = topology.nodes.iter().map(|n| n.index()).sum();
         assert_eq!(i64::from(sum), 4 * surface.euler_characteristic(), "{name}");
         // At every corner of a patch by a quarter from one arc to the next, and along arcs not at all: so along every
         // cycle of arcs, around handles and boundaries, by the sum of its corners.
         for patch in &layout.patches {
             for i in 0..4 {
                 let ((out, forward), (into, came)) = (patch.sides[i], patch.sides[(i + 3) % 4]);
-                let (mut at, mut heading) = end(&net, out, !forward);
-                let (to, next) = end(&net, into, came);
-                while net.mesh.face(at) != net.mesh.face(to) {
-                    let across = net.mesh.prev(at);
-                    heading -= net.jump_across(across);
-                    at = net.mesh.twin(across).unwrap();
+                let (mut at, mut heading) = end(&topology, out, !forward);
+                let (to, next) = end(&topology, into, came);
+                while topology.mesh.face(at) != topology.mesh.face(to) {
+                    let across = topology.mesh.prev(at);
+                    heading -= topology.jump_across(across);
+                    at = topology.mesh.twin(across).unwrap();
                 }
                 assert_eq!((next - heading).rem_euclid(4), 1, "{name}: arcs {out} and {into}");
             }
@@ -75,22 +90,22 @@ fn the_field_turns_as_the_layout_says_on_every_surface() {
     }
 }
 
-/// What is embedded.
-struct Stage {
+/// A surface with what an embedding needs of it.
+struct Prepared {
     mesh: TriMesh,
     index: SurfaceIndex,
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
 }
 
-impl Stage {
+impl Prepared {
     fn new(mesh: TriMesh) -> Self {
         let sharp = vec![false; mesh.n_edges()];
         let curvature = principal_curvature(&mesh, Options::default().curvature_radius, &sharp);
         Self { index: SurfaceIndex::new(&mesh), curvature, sharp, mesh }
     }
 
-    fn job<'a>(
+    fn problem<'a>(
         &'a self,
         layout: &'a QuadLayout,
         initial_embedding: &'a Embedding,
@@ -109,12 +124,12 @@ impl Stage {
     }
 }
 
-fn job_of<'a>(session: &'a Session, drawn: &'a InitialLayout, arc_headings: &'a [ArcHeadings]) -> Problem<'a> {
+fn problem_of<'a>(session: &'a Session, initial: &'a InitialLayout, arc_headings: &'a [ArcHeadings]) -> Problem<'a> {
     let model = session.model();
     Problem {
         surface: Surface { mesh: &model.mesh, index: &model.index, curvature: &model.curvature, sharp: &model.sharp },
-        layout: &drawn.layout,
-        initial_embedding: &drawn.embedding,
+        layout: &initial.layout,
+        initial_embedding: &initial.embedding,
         arc_headings,
         pinned_nodes: &[],
         pinned_arcs: &[],
@@ -122,7 +137,7 @@ fn job_of<'a>(session: &'a Session, drawn: &'a InitialLayout, arc_headings: &'a 
     }
 }
 
-/// The same drawing with arcs and nodes numbered backward, and patches that begin with their second side.
+/// The same layout with arcs and nodes numbered backward, and patches that begin with their second side.
 fn renumbered(InitialLayout { layout, embedding, mesh_role }: &InitialLayout) -> InitialLayout {
     let (a, n) = (layout.arcs.len() as u32 - 1, layout.nodes.len() as u32 - 1);
     let patch = |p: &Patch| Patch {
@@ -148,22 +163,24 @@ fn renumbered(InitialLayout { layout, embedding, mesh_role }: &InitialLayout) ->
 
 #[test]
 fn the_map_does_not_depend_on_how_parts_are_numbered() {
-    let Some((session, drawn)) = woven("cino_3holes") else { return };
-    let energy = |drawn: &InitialLayout| {
-        let arc_headings = arc_headings(&drawn.layout);
-        let optimiser = Optimiser::new(&job_of(&session, drawn, &arc_headings), &Progress::new()).unwrap();
+    let Some(woven) = woven("cino_3holes") else { return };
+    let Woven { session, initial } = &*woven;
+    let energy = |initial: &InitialLayout| {
+        let arc_headings = arc_headings(&initial.layout);
+        let optimiser = Optimiser::new(&problem_of(session, initial, &arc_headings), &Progress::new()).unwrap();
         optimiser.state().solution.energy
     };
-    let (a, b) = (energy(&drawn), energy(&renumbered(&drawn)));
+    let (a, b) = (energy(initial), energy(&renumbered(initial)));
     assert!(a > 0.0 && (a - b).abs() < 1e-6 * a, "{a} and {b}");
 }
 
 #[test]
 fn energy_falls_and_half_of_it_in_three_steps() {
     for name in ["cino_3holes", "pretzel"] {
-        let Some((session, drawn)) = woven(name) else { return };
-        let arc_headings = arc_headings(&drawn.layout);
-        let mut optimiser = Optimiser::new(&job_of(&session, &drawn, &arc_headings), &Progress::new()).unwrap();
+        let Some(woven) = woven(name) else { continue };
+        let Woven { session, initial } = &*woven;
+        let arc_headings = arc_headings(&initial.layout);
+        let mut optimiser = Optimiser::new(&problem_of(session, initial, &arc_headings), &Progress::new()).unwrap();
         let mut seen = vec![optimiser.state().solution.energy];
         while !optimiser.is_done() {
             let better = optimiser.step(&Progress::new()).unwrap();
@@ -178,27 +195,24 @@ fn energy_falls_and_half_of_it_in_three_steps() {
 
 #[test]
 fn a_boundary_is_an_isoline_edge_by_edge() {
-    let Some(folder) = meshes() else { return };
-    let source = MeshSource::File(folder.join("lilium.obj"));
-    if !folder.join("lilium.obj").is_file() {
-        return;
-    }
+    let Some(path) = support::mesh("lilium.obj") else { return };
+    let source = MeshSource::File(path);
     let loaded = source.load(std::path::Path::new("")).unwrap();
     let mut session = Session::open(loaded, source, Options::default(), &Progress::new()).unwrap();
     session.weave_to(Goal::Valid, &Progress::new()).unwrap();
-    let drawn = initial_layout(&session, &Progress::new()).unwrap();
-    let arc_headings = arc_headings(&drawn.layout);
-    let mut optimiser = Optimiser::new(&job_of(&session, &drawn, &arc_headings), &Progress::new()).unwrap();
+    let initial = initial_layout(&session, &Progress::new()).unwrap();
+    let arc_headings = arc_headings(&initial.layout);
+    let mut optimiser = Optimiser::new(&problem_of(&session, &initial, &arc_headings), &Progress::new()).unwrap();
     for _ in 0..3 {
         optimiser.step(&Progress::new()).unwrap();
     }
-    optimiser.finish(&Progress::new()).unwrap();
+    optimiser.finalise(&Progress::new()).unwrap();
     let state = optimiser.state();
-    let (mesh, map) = (&state.net.mesh, &state.solution.map);
+    let (mesh, map) = (&state.topology.mesh, &state.solution.map);
     let uv = |h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
     let mut edges = 0;
     for h in mesh.halfedges().filter(|&h| mesh.twin(h).is_none()) {
-        let (heading, _) = state.net.boundary[&h];
+        let (heading, _) = state.topology.boundary[&h];
         let along = uv(mesh.next(h)) - uv(h);
         let (constant, way) = if heading % 2 == 0 { (along.y, along.x) } else { (along.x, along.y) };
         assert!(constant.abs() < 1e-9, "{constant} across edge of {way}");
@@ -207,14 +221,14 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     assert!(edges > 100, "{edges}");
 }
 
-/// An icosahedron on a sphere, every triangle in three patches around its middle, on a mesh of 1920 triangles: 12 nodes of
-/// valence 5 among 20 of valence 3.
-fn icosahedron() -> (Stage, QuadLayout, Embedding) {
+/// The layout of an icosahedron on a sphere of 1920 triangles, every face of the icosahedron divided into three patches around
+/// its centre: 12 nodes of valence 5, 20 of valence 3, and 30 regular ones.
+fn icosahedron() -> (Prepared, QuadLayout, Embedding) {
     icosahedron_of(2)
 }
 
-/// The same on a mesh of 120 triangles that are split in four so many times.
-fn icosahedron_of(splits: u32) -> (Stage, QuadLayout, Embedding) {
+/// The same on a mesh of 120 triangles, each split in four `splits` times.
+fn icosahedron_of(splits: u32) -> (Prepared, QuadLayout, Embedding) {
     let g = 0.5 * (1.0 + 5f64.sqrt());
     let mut points: Vec<DVec3> = Vec::new();
     for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
@@ -304,11 +318,11 @@ fn icosahedron_of(splits: u32) -> (Stage, QuadLayout, Embedding) {
         // Every patch was two triangles.
         seeds: (0..patches.len() as u32).map(|p| (2 * p) << (2 * splits)).collect(),
     };
-    (Stage::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), initial_embedding)
+    (Prepared::new(mesh), QuadLayout::new(nodes, arcs, patches, 2).unwrap(), initial_embedding)
 }
 
-/// That every arc of a drawing runs from its first node to its second along edges marked as its own.
-fn is_drawn(layout: &QuadLayout, initial_embedding: &Embedding) {
+/// Checks that every arc runs from its first node to its second along edges marked as its own.
+fn check_embedding(layout: &QuadLayout, initial_embedding: &Embedding) {
     for (a, (arc, path)) in (0..).zip(layout.arcs.iter().zip(&initial_embedding.arcs)) {
         let ends = [path[0], path[path.len() - 1]];
         assert_eq!(ends, arc.nodes.map(|n| initial_embedding.nodes[n as usize]), "arc {a}");
@@ -322,30 +336,30 @@ fn is_drawn(layout: &QuadLayout, initial_embedding: &Embedding) {
 }
 
 #[test]
-fn a_drawing_is_carried_to_a_proxy_and_back() {
-    let (stage, layout, initial_embedding) = icosahedron_of(4);
-    let proxy = Proxy::new(&stage.mesh, &stage.sharp, 6000, &Progress::new()).unwrap();
+fn an_embedding_is_transferred_to_a_proxy_and_back() {
+    let (prepared, layout, initial_embedding) = icosahedron_of(4);
+    let proxy = Proxy::new(&prepared.mesh, &prepared.sharp, 6000, &Progress::new()).unwrap();
     let at = |v: VertexId| SurfacePoint {
-        face: stage.mesh.face(stage.mesh.vertex_halfedge(v)),
+        face: prepared.mesh.face(prepared.mesh.vertex_halfedge(v)),
         weights: [0, 1, 2].map(|i| {
-            let corner = stage.mesh.face_vertices(stage.mesh.face(stage.mesh.vertex_halfedge(v)))[i];
+            let corner = prepared.mesh.face_vertices(prepared.mesh.face(prepared.mesh.vertex_halfedge(v)))[i];
             if corner == v { 1.0 } else { 0.0 }
         }),
     };
-    // Nodes of the drawing are vertices of the mesh.
+    // Nodes are vertices of the mesh.
     let to = |n: usize| {
-        Some(proxy.to_proxy(&stage.mesh, at(VertexId(initial_embedding.nodes[n]))).nearest_vertex(proxy.mesh()))
+        Some(proxy.to_proxy(&prepared.mesh, at(VertexId(initial_embedding.nodes[n]))).nearest_vertex(proxy.mesh()))
     };
-    let carried = |line: &DualCurve| proxy.polyline_to_proxy(&stage.mesh, &line.points, line.closed).ok();
-    let own = (&layout, &initial_embedding, stage.mesh.n_vertices());
+    let carried = |line: &DualCurve| proxy.polyline_to_proxy(&prepared.mesh, &line.points, line.closed).ok();
+    let own = (&layout, &initial_embedding, prepared.mesh.n_vertices());
     let coarse = carry(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
-    is_drawn(&layout, &coarse);
-    let carried = |line: &DualCurve| proxy.polyline_to_original(&stage.mesh, &line.points, line.closed).ok();
+    check_embedding(&layout, &coarse);
+    let carried = |line: &DualCurve| proxy.polyline_to_original(&prepared.mesh, &line.points, line.closed).ok();
     let own = (&layout, &coarse, proxy.mesh().n_vertices());
-    let back = carry(own, &stage.mesh, carried, |n| Some(VertexId(initial_embedding.nodes[n])), &Progress::new());
+    let back = carry(own, &prepared.mesh, carried, |n| Some(VertexId(initial_embedding.nodes[n])), &Progress::new());
     let back = back.unwrap().unwrap();
-    is_drawn(&layout, &back);
-    // Every part has kept its number: nodes lie where they lay, and arcs near.
+    check_embedding(&layout, &back);
+    // Every part has its number again: nodes have their positions, and arcs lie near theirs.
     assert_eq!(back.nodes, initial_embedding.nodes);
     let middle = |d: &Embedding, a: usize| d.mesh.positions[d.arcs[a][d.arcs[a].len() / 2] as usize];
     for a in 0..layout.arcs.len() {
@@ -355,58 +369,59 @@ fn a_drawing_is_carried_to_a_proxy_and_back() {
 }
 
 #[test]
-fn a_large_mesh_is_embedded_by_way_of_a_proxy() {
-    let (stage, layout, initial_embedding) = icosahedron_of(4);
+fn a_large_mesh_is_embedded_on_a_proxy_first() {
+    let (prepared, layout, initial_embedding) = icosahedron_of(4);
     let arc_headings = arc_headings(&layout);
-    let job = stage.job(&layout, &initial_embedding, &arc_headings);
+    let problem = prepared.problem(&layout, &initial_embedding, &arc_headings);
     let progress = Progress::new();
     let mut seen = 0;
     let mut on_surface = |s: &Snapshot| {
         let points = s.nodes.iter().chain(s.arcs.iter().flatten().flatten());
         assert!(points.clone().count() > 0);
         for p in points {
-            assert!(stage.index.nearest(*p).position(&stage.mesh).distance(*p) < 1e-9);
+            assert!(prepared.index.nearest(*p).position(&prepared.mesh).distance(*p) < 1e-9);
         }
         seen += 1;
         Next::Continue
     };
-    let done = optimise(&job, &progress, &mut on_surface).unwrap();
+    let done = optimise_embedding(&problem, &progress, &mut on_surface).unwrap();
     assert!(progress.stage_times().iter().any(|s| s.stage == "Simplifying the mesh"));
     assert!(seen > 1);
     assert_eq!(done.layout, layout);
-    assert!(done.report.folds.is_empty());
-    is_drawn(&layout, &done.embedding);
-    // On a sphere patches of an icosahedron's thirds cannot be without distortion, and need not have more than this.
+    assert!(done.report.remaining_flips.is_empty());
+    check_embedding(&layout, &done.embedding);
+    // Thirds of an icosahedron's faces on a sphere cannot be without distortion, and need not have more than this.
     assert!(done.report.measures.conformal < 2.12, "{:?}", done.report.measures);
 }
 
 #[test]
-fn a_proxy_does_not_outlast_a_cancellation() {
-    let (stage, layout, initial_embedding) = icosahedron_of(4);
+fn an_optimisation_on_a_proxy_is_cancelled() {
+    let (prepared, layout, initial_embedding) = icosahedron_of(4);
     let arc_headings = arc_headings(&layout);
     let progress = Progress::new();
     let mut stop = |_: &Snapshot| {
         progress.cancel();
         Next::Continue
     };
-    let stopped = optimise(&stage.job(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
+    let stopped =
+        optimise_embedding(&prepared.problem(&layout, &initial_embedding, &arc_headings), &progress, &mut stop);
     assert!(matches!(stopped, Err(EmbeddingError::Cancelled(_))));
 }
 
 fn embedded(settings: Settings) -> (QuadLayout, OptimisedEmbedding) {
-    let (stage, layout, initial_embedding) = icosahedron();
-    embedded_on(&stage, layout, &initial_embedding, settings)
+    let (prepared, layout, initial_embedding) = icosahedron();
+    embedded_on(&prepared, layout, &initial_embedding, settings)
 }
 
 fn embedded_on(
-    stage: &Stage,
+    prepared: &Prepared,
     layout: QuadLayout,
     initial_embedding: &Embedding,
     settings: Settings,
 ) -> (QuadLayout, OptimisedEmbedding) {
     let arc_headings = arc_headings(&layout);
-    let job = Problem { settings, ..stage.job(&layout, initial_embedding, &arc_headings) };
-    let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+    let problem = Problem { settings, ..prepared.problem(&layout, initial_embedding, &arc_headings) };
+    let done = optimise_embedding(&problem, &Progress::new(), &mut |_| Next::Continue).unwrap();
     done.layout.check(2).unwrap();
     let sum: i64 = done.layout.nodes.iter().map(|n| 4 - n.valence as i64).sum();
     assert_eq!(sum, 8);
@@ -416,21 +431,21 @@ fn embedded_on(
 #[test]
 fn short_chords_are_collapsed() {
     let (_, plain) = embedded(Settings::default());
-    assert!(plain.report.collapsed.is_empty() && plain.initial_embedding.is_none());
+    assert!(plain.report.collapsed_chords.is_empty() && plain.initial_embedding.is_none());
     let shortest = plain.maps.iter().flat_map(|m| [m.size.x, m.size.y]).fold(f64::INFINITY, f64::min);
     let (given, done) = embedded(Settings { collapse: Some(1.2 * shortest), ..Settings::default() });
     let report = &done.report;
-    assert!(!report.collapsed.is_empty(), "{report:?}");
-    assert_eq!(done.layout.chords, given.chords - report.collapsed.len());
+    assert!(!report.collapsed_chords.is_empty(), "{report:?}");
+    assert_eq!(done.layout.chords, given.chords - report.collapsed_chords.len());
     assert!(done.layout.patches.len() < given.patches.len() && done.initial_embedding.is_some());
     assert!(done.maps.iter().all(|m| m.flipped == 0 && m.size.min_element() > 0.0));
 }
 
 #[test]
-fn strips_are_left_out_that_only_make_a_layout_irregular() {
+fn chords_are_removed_that_only_make_a_layout_irregular() {
     // The chords of the icosahedron go around its corners, and those of three corners of a triangle cross in it. Without
     // two of these the corners are one node, and without the third the middle of the triangle becomes a part of it.
-    let (stage, layout, initial_embedding) = icosahedron();
+    let (prepared, layout, initial_embedding) = icosahedron();
     let simpler = |layout: &QuadLayout| {
         let less = |c| layout.collapse(c).is_ok_and(|left| left.layout.irregularity() < layout.irregularity());
         (0..layout.chords as u32).any(less)
@@ -440,15 +455,15 @@ fn strips_are_left_out_that_only_make_a_layout_irregular() {
     let mut gone = pairs.map(|(a, b)| (0..layout.chords).map(|c| c == a || c == b).collect::<Vec<bool>>());
     let gone = gone.find(|gone| layout.without(gone).is_ok_and(|left| simpler(&left.layout))).unwrap();
     let left =
-        redraw(&layout, &initial_embedding, &gone, |_| false, stage.mesh.n_vertices(), &Progress::new()).unwrap();
+        redraw(&layout, &initial_embedding, &gone, |_| false, prepared.mesh.n_vertices(), &Progress::new()).unwrap();
     let settings = Settings { simplify: true, ..Settings::default() };
-    let (given, done) = embedded_on(&stage, left.layout, &left.embedding, settings);
+    let (given, done) = embedded_on(&prepared, left.layout, &left.embedding, settings);
     assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);
-    assert_eq!(done.layout.chords, given.chords - done.report.collapsed.len());
+    assert_eq!(done.layout.chords, given.chords - done.report.collapsed_chords.len());
 }
 
 #[test]
-fn patches_are_whole_numbers_of_quads() {
+fn sides_of_patches_are_integers() {
     let edge = 0.06;
     let (_, done) = embedded(Settings { integer: Some(edge), ..Settings::default() });
     let (counts, off) = integer_grid_counts(&done.layout, &done.maps, edge);
@@ -460,11 +475,12 @@ fn patches_are_whole_numbers_of_quads() {
     assert_eq!(TriMesh::from_faces(quads.positions, &triangles).unwrap().euler_characteristic(), 2);
 
     for name in ["cino_3holes", "pretzel"] {
-        let Some((session, drawn)) = woven(name) else { return };
-        let arc_headings = arc_headings(&drawn.layout);
+        let Some(woven) = woven(name) else { continue };
+        let Woven { session, initial } = &*woven;
+        let arc_headings = arc_headings(&initial.layout);
         let settings = Settings { integer: Some(0.05), steps: 3, ..Settings::default() };
-        let job = Problem { settings, ..job_of(&session, &drawn, &arc_headings) };
-        let done = optimise(&job, &Progress::new(), &mut |_| Next::Continue).unwrap();
+        let problem = Problem { settings, ..problem_of(session, initial, &arc_headings) };
+        let done = optimise_embedding(&problem, &Progress::new(), &mut |_| Next::Continue).unwrap();
         let (_, off) = integer_grid_counts(&done.layout, &done.maps, 0.05);
         assert!(off < 1e-8, "{name}: {off}");
     }

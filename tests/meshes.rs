@@ -1,4 +1,4 @@
-//! `plait info` on every mesh there is, and on files that are none: an answer or a message, never a crash.
+//! `plait info` on every research mesh, and on files that are no meshes: an answer or a message, never a crash.
 
 mod support;
 
@@ -28,7 +28,7 @@ fn built_in_models_are_described() {
 }
 
 #[test]
-fn every_real_mesh_gets_its_facts_or_a_reason() {
+fn every_research_mesh_is_described_or_refused_with_a_reason() {
     let Some(folder) = meshes() else { return };
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).unwrap();
     let mut seen = 0;
@@ -37,7 +37,7 @@ fn every_real_mesh_gets_its_facts_or_a_reason() {
         let (file, genus, loops, components, manifold) = (columns[1], columns[5], columns[6], columns[7], columns[8]);
         let path = folder.join(file);
         if !path.is_file() {
-            eprintln!("note: skipped, there is no {}", path.display());
+            support::skip(&format!("there is no {}", path.display()));
             continue;
         }
         seen += 1;
@@ -71,9 +71,9 @@ fn a_surface_with_one_side_is_refused_and_the_reason_given() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = write(folder.path(), "moebius.obj", obj.as_bytes());
-    let mut meshes_with_one_side = vec![path];
-    meshes_with_one_side.extend(meshes().map(|m| m.join("gc_moebius.obj")).filter(|p| p.is_file()));
-    for path in meshes_with_one_side {
+    let mut one_sided = vec![path];
+    one_sided.extend(support::mesh("gc_moebius.obj"));
+    for path in one_sided {
         let message = info(text(&path)).unwrap_err();
         assert!(message.contains("one side") || message.contains("one-sided"), "{message}");
     }
@@ -119,10 +119,9 @@ fn truncated_files_are_refused_or_read_as_far_as_they_go() {
         let path = write(folder.path(), &format!("cut{i}.obj"), &whole[..cut]);
         let _ = info(text(&path));
     }
-    let Some(meshes) = meshes() else { return };
     for file in ["vase_open.off", "rockerarm_1k.off"] {
-        let path = meshes.join(file);
-        let Ok(whole) = std::fs::read(&path) else { continue };
+        let Some(path) = support::mesh(file) else { continue };
+        let whole = std::fs::read(&path).unwrap();
         for cut in [3, 20, whole.len() / 3, whole.len() - 40] {
             let path = write(folder.path(), file, &whole[..cut]);
             assert!(info(text(&path)).is_err(), "{file} cut after {cut} bytes was taken for whole");

@@ -36,7 +36,7 @@ fn suggestions_on_a_proxy_become_quads_on_the_mesh() {
         assert_eq!(report["faces"], mesh.n_faces(), "{report}");
         let n = report["proxy"]["triangles"].as_u64().unwrap();
         assert!(n <= proxy && n + 10 > proxy, "{report}");
-        assert_eq!(report["proxy"]["embedded"], false, "{report}");
+        assert_eq!(report["proxy"]["layout_on_proxy"], false, "{report}");
         assert_eq!(report["valid"], true, "{report}");
 
         let quads = read_faces(&out.join("quads.obj"));

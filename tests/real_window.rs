@@ -1,5 +1,7 @@
 //! The real window on a virtual screen, driven by a pointer and keys.
 
+mod support;
+
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -7,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use image::RgbImage;
 
-/// Longest wait for anything; a busy machine without a GPU takes some seconds.
+/// Longest wait for the window; a busy machine without a GPU takes some seconds.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A process that is ended with the test.
@@ -28,11 +30,11 @@ struct Screen {
 }
 
 impl Screen {
-    /// `None` with a note where a tool is missing.
+    /// `None` where a tool is missing.
     fn open() -> Option<Self> {
         for tool in ["Xvfb", "xdotool", "import"] {
             if Command::new(tool).arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_err() {
-                eprintln!("note: skipped, there is no {tool} (packages xvfb, xdotool, imagemagick)");
+                support::skip(&format!("there is no {tool} (packages xvfb, xdotool, imagemagick)"));
                 return None;
             }
         }
@@ -67,8 +69,8 @@ impl Screen {
         image::open(&path).unwrap().to_rgb8()
     }
 
-    /// Waits until the screen shows the same three times in a row and differs from `before` by many pixels.
-    fn settled(&self, before: &RgbImage) -> RgbImage {
+    /// Waits until three pictures in a row are the same and differ from `before` by many pixels.
+    fn steady(&self, before: &RgbImage) -> RgbImage {
         let mut last = self.picture();
         let mut same = 0;
         wait_for("the screen to change and rest", || {
@@ -95,7 +97,7 @@ fn different(a: &RgbImage, b: &RgbImage) -> usize {
 }
 
 #[test]
-fn strips_are_placed_and_taken_back_in_the_real_window() {
+fn strips_are_placed_and_undone_in_the_real_window() {
     let Some(screen) = Screen::open() else { return };
     let errors = screen.folder.path().join("errors.txt");
     let mut program = Running(
@@ -114,14 +116,14 @@ fn strips_are_placed_and_taken_back_in_the_real_window() {
     });
     screen.xdotool("mousemove 20 700");
     screen.xdotool(&format!("windowfocus --sync {}", window.lines().next().unwrap()));
-    let empty = screen.settled(&RgbImage::new(1280, 800));
+    let empty = screen.steady(&RgbImage::new(1280, 800));
 
     screen.xdotool("key s");
-    let one = screen.settled(&empty);
+    let one = screen.steady(&empty);
     screen.xdotool("key s");
-    let two = screen.settled(&one);
+    let two = screen.steady(&one);
     screen.xdotool("key ctrl+z");
-    let again = screen.settled(&two);
+    let again = screen.steady(&two);
     assert!(different(&again, &one) < different(&again, &two), "undo does not show what was there before");
 
     screen.xdotool("key ctrl+q");

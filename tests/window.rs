@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use egui::{Modifiers, PointerButton, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable};
-use plait_app::distortion::Colours;
+use plait_app::distortion::ColourMode;
 use plait_app::engine::{LayoutPart, Opener, Source};
-use plait_app::weaving::SessionOpener;
+use plait_app::session_engine::SessionOpener;
 use plait_app::window::PlaitApp;
 
 /// Slow machines draw a frame in a tenth of a second; the work in between must not be cut short.
@@ -84,7 +84,7 @@ const FRONT: egui::Pos2 = pos2(400.0, 430.0);
 #[test]
 fn a_strip_is_offered_browsed_placed_hidden_and_taken_back() {
     let mut window = open("torus");
-    window.get_by_label("No strip is placed yet");
+    window.get_by_label("No strips placed yet");
     hover(&mut window, FRONT);
     let (count, chosen) = window.state().offered();
     assert_eq!(chosen, 0);
@@ -118,11 +118,11 @@ fn detail_is_chosen_with_strips_in_place_and_can_be_taken_back() {
     click(&mut window, FRONT);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 1));
     let length = window.state().scene().unwrap().strips[0].length;
-    window.get_by_label("Detail").click();
+    window.get_by_label("Curvature and smoothing").click();
     window.run_steps(30);
-    let apply = "Weave with this detail";
-    // The end of the slider: as much as there is.
-    window.get_by_role_and_label(egui::accesskit::Role::Slider, "Ignore relief below").focus();
+    let apply = "Apply";
+    // The end of the slider: the largest radius.
+    window.get_by_role_and_label(egui::accesskit::Role::Slider, "Smoothing radius").focus();
     window.run_steps(2);
     for _ in 0..20 {
         window.key_press(egui::Key::ArrowRight);
@@ -160,7 +160,7 @@ fn exporting_too_early_says_why() {
     let mut window = open("torus");
     window.get_by_label("Export").click();
     window.run_steps(6);
-    window.get_by_label("There is no layout to export yet: No strip is placed yet");
+    window.get_by_label("The layout is not valid yet: No strips placed yet");
     window.get_by_label("Dismiss").click();
     window.run_steps(6);
     assert!(window.query_by_label("Dismiss").is_none());
@@ -242,14 +242,14 @@ fn an_optimisation_is_watched_stopped_and_kept() {
     // The scene is still that of before; the picture runs ahead.
     assert_eq!(window.state().scene().unwrap().layout.as_ref().unwrap().nodes[0].position.x, stand_in::moved(0));
     assert!(window.query_by_label("Optimise").is_none());
-    window.get_by_label_contains("· 3 folds");
+    window.get_by_label_contains("3 flipped triangles");
     until(&mut window, |app| first_node(app) > stand_in::moved(5));
     window.get_by_label("Stop").click();
     wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
     assert!(first_node(window.state()) > stand_in::moved(5));
     window.get_by_label("0.500 to 0.250");
     window.get_by_label("3 to 0");
-    window.get_by_label("7.5° off");
+    window.get_by_label("7.5°");
     window.get_by_label("Optimise again");
 }
 
@@ -274,13 +274,13 @@ fn a_layout_is_improved_watched_stopped_and_kept() {
     window.get_by_label("Improve the layout").click();
     // The strips change while it goes on.
     until(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() > 2));
-    window.get_by_label_contains("patches · before 10.0°, 20");
+    window.get_by_label_contains("Alignment error");
     assert!(window.query_by_label("Improve the layout").is_none());
     window.get_by_label("Stop").click();
     wait(&mut window, |app| app.is_idle());
     let strips = window.state().scene().unwrap().strips.len();
     assert!((3..10).contains(&strips), "{strips}");
-    window.get_by_label_contains("Improved: the layout follows the shape within");
+    window.get_by_label_contains("Layout improved: alignment error");
     window.get_by_label("Improve the layout");
 }
 
@@ -301,7 +301,7 @@ fn other_strips_forget_the_optimised_embedding_and_say_so() {
     window.key_press(egui::Key::S);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
     assert!(window.state().scene().unwrap().embedding.is_none());
-    window.get_by_label_contains("the optimised embedding is gone");
+    window.get_by_label_contains("The optimised embedding was discarded");
     window.get_by_label("Optimise");
 }
 
@@ -335,15 +335,15 @@ fn clicks_on_nodes_and_arcs_pin_them_and_let_them_go() {
 #[test]
 fn the_surface_takes_the_colours_that_are_chosen() {
     let mut window = with_layout();
-    assert!(window.query_by_label("Colours").is_none());
+    assert!(window.query_by_label("Colour by").is_none());
     optimise_and_stop(&mut window);
     let plain = window.render().unwrap();
     window.get_by_role(egui::accesskit::Role::ComboBox).click();
     window.run_steps(4);
-    window.get_by_label("Alignment error").click();
+    window.get_by_role_and_label(egui::accesskit::Role::Button, "Alignment error").click();
     window.run_steps(6);
-    assert_eq!(window.state().colours(), Colours::Alignment);
-    window.get_by_label_contains("Degrees off the nearest");
+    assert_eq!(window.state().colour_mode(), ColourMode::Alignment);
+    window.get_by_label_contains("Angle to the nearest principal");
     let picture = window.render().unwrap();
     // Half of the triangles are at the dark red end of the scale, none was before.
     let is_red = |p: &&image::Rgba<u8>| i32::from(p[0]) > i32::from(p[1].max(p[2])) + 25;
@@ -351,7 +351,7 @@ fn the_surface_takes_the_colours_that_are_chosen() {
     assert!(red(&picture) > red(&plain) + 5000, "{} {}", red(&picture), red(&plain));
     window.key_press(egui::Key::S);
     wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 2));
-    assert_eq!(window.state().colours(), Colours::Regions);
+    assert_eq!(window.state().colour_mode(), ColourMode::Regions);
 }
 
 #[test]

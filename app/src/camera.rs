@@ -1,19 +1,20 @@
 //! The camera: a turntable around a target, with pan, zoom toward a point, and framing.
 //!
-//! Right-handed; the turntable's axis is world y unless [`Camera::z_up`]. Angles in radians, lengths in world units
-//! (models are normalised to a bounding-box diagonal of 1), screen positions in points from the top left corner.
+//! World space is right-handed. The axis of the turntable is world y, or z with [`Camera::z_up`]. Angles are in
+//! radians, lengths in world units (models have a bounding-box diagonal of 1), screen positions in points from the top
+//! left corner.
 
 use glam::{Mat4, Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};
 
 use crate::render::ViewUniforms;
 
-/// Half the world diagonal seen around the target stays within these distances, so that one cannot get lost.
+/// Least and largest distance of the eye from the target, so that the model cannot get lost. Chosen by hand.
 const DISTANCES: std::ops::RangeInclusive<f32> = 0.005..=20.0;
-/// Just short of the poles, where "up" would have no meaning.
+/// Largest pitch, just below π/2, where the up direction is not defined.
 const MAX_PITCH: f32 = 1.55;
-/// How much of the image a framed model fills.
+/// Share of the image that a framed model fills.
 const FILLED: f32 = 0.86;
-/// Radians of turn per point of drag: half a turn across about 450 points.
+/// Rotation per point of drag, in radians: half a turn for 450 points.
 const TURN: f32 = 0.007;
 
 /// A turntable camera.
@@ -21,15 +22,15 @@ const TURN: f32 = 0.007;
 pub struct Camera {
     /// The point the camera turns about and looks at.
     pub target: Vec3,
-    /// From the target to the eye.
+    /// Distance from the target to the eye.
     pub distance: f32,
-    /// Turn about the up axis; 0 looks along −z.
+    /// Rotation about the up axis; 0 looks along −z.
     pub yaw: f32,
-    /// Height of the eye over the target; positive looks down.
+    /// Elevation of the eye above the target; positive looks down.
     pub pitch: f32,
     /// Whether the turntable's axis is world z instead of y.
     pub z_up: bool,
-    /// Full vertical angle of view.
+    /// Vertical field of view.
     pub vertical_fov: f32,
 }
 
@@ -44,16 +45,16 @@ impl Default for Camera {
 pub struct Ray {
     /// The eye.
     pub origin: Vec3,
-    /// Of unit length.
+    /// Unit direction.
     pub direction: Vec3,
 }
 
 impl Camera {
-    /// The rigid motion from view space (looking along −z, y up) to world space.
+    /// The rigid transformation from view space (looking along −z, y up) to world space.
     pub fn world_from_view(&self) -> Mat4 {
         let turn = Mat4::from_rotation_y(self.yaw) * Mat4::from_rotation_x(-self.pitch);
-        let lift = if self.z_up { Mat4::from_rotation_x(std::f32::consts::FRAC_PI_2) } else { Mat4::IDENTITY };
-        Mat4::from_translation(self.target) * lift * turn * Mat4::from_translation(Vec3::Z * self.distance)
+        let up = if self.z_up { Mat4::from_rotation_x(std::f32::consts::FRAC_PI_2) } else { Mat4::IDENTITY };
+        Mat4::from_translation(self.target) * up * turn * Mat4::from_translation(Vec3::Z * self.distance)
     }
 
     /// The inverse of [`Self::world_from_view`].
@@ -61,18 +62,18 @@ impl Camera {
         self.world_from_view().inverse()
     }
 
-    /// Distances of the near and the far plane: around a model of diagonal 1 wherever the target was panned to.
+    /// Distances of the near and the far clipping plane. The far plane is beyond the model wherever the target is.
     pub fn planes(&self) -> (f32, f32) {
         (self.distance * 0.02, self.distance + 8.0)
     }
 
-    /// The projection for an image of this shape; depth from 0 (near) to 1 (far).
+    /// The projection for an image of this aspect ratio; depth from 0 (near) to 1 (far).
     pub fn clip_from_view(&self, aspect_ratio: f32) -> Mat4 {
         let (near, far) = self.planes();
         glam::camera::rh::proj::directx::perspective(self.vertical_fov, aspect_ratio, near, far)
     }
 
-    /// What the shaders need for an image of `size`.
+    /// The view for an image of `size`, for the shaders.
     pub fn uniforms(&self, size: Vec2) -> ViewUniforms {
         let (near, far) = self.planes();
         ViewUniforms::new(self.clip_from_view(aspect(size)), self.view_from_world(), near, far)
@@ -97,20 +98,20 @@ impl Camera {
         (clip.w > 0.0).then(|| (ndc * Vec2::new(0.5, -0.5) + 0.5) * size)
     }
 
-    /// Turns by a drag of `delta` points.
+    /// Rotates by a drag of `delta` points.
     pub fn orbit(&mut self, delta: Vec2) {
         self.yaw = (self.yaw - delta.x * TURN).rem_euclid(std::f32::consts::TAU);
         self.pitch = (self.pitch + delta.y * TURN).clamp(-MAX_PITCH, MAX_PITCH);
     }
 
-    /// Moves sideways by a drag of `delta` points, so that the target follows the pointer.
+    /// Moves parallel to the image by a drag of `delta` points, so that the target follows the pointer.
     pub fn pan(&mut self, delta: Vec2, size: Vec2) {
         let per_point = 2.0 * self.distance * (self.vertical_fov * 0.5).tan() / size.y.max(1.0);
         let world_from_view = self.world_from_view();
         self.target += world_from_view.transform_vector3(Vec3::new(-delta.x, delta.y, 0.0)) * per_point;
     }
 
-    /// Comes nearer by `factor` (below 1) or recedes (above 1); `toward` stays where it is on the screen.
+    /// Scales the distance by `factor`: below 1 zooms in. The point `toward` keeps its place on the screen.
     pub fn zoom(&mut self, factor: f32, toward: Vec3) {
         let distance = (self.distance * factor).clamp(*DISTANCES.start(), *DISTANCES.end());
         let factor = distance / self.distance;
@@ -118,14 +119,14 @@ impl Camera {
         self.distance = distance;
     }
 
-    /// The point under `at` at the target's depth: where to zoom to over the background.
+    /// The point under `at` at the depth of the target, to zoom to where there is no surface.
     pub fn point_at_target_depth(&self, at: Vec2, size: Vec2) -> Vec3 {
         let ray = self.ray(at, size);
         let forward = (self.target - ray.origin).normalize();
         ray.origin + ray.direction * (self.distance / ray.direction.dot(forward).max(1e-3))
     }
 
-    /// Looks at `points` from the present direction so that they fill the image but for a margin.
+    /// Moves target and distance so that `points` fill the image up to a margin. The direction of view stays.
     pub fn frame(&mut self, points: &[Vec3], size: Vec2) {
         if points.is_empty() {
             return;
@@ -136,7 +137,7 @@ impl Camera {
         let half = (self.vertical_fov * 0.5).tan();
         let limits = Vec2::new(half * aspect(size), half) * FILLED;
         self.distance = 2.0 * reach / limits.min_element();
-        // Perspective makes the fit a fixed point; from outside it is reached in a few steps.
+        // In perspective the fit is a fixed point of this iteration, which converges in a few steps.
         for _ in 0..6 {
             let view_from_world = self.view_from_world();
             let slope = |p: &Vec3| {

@@ -1,7 +1,7 @@
-//! What the window asks of the engine, and what it is shown: a trait and plain data.
+//! The interface between the window and the library: a trait for what can be done, and plain data for what is shown.
 //!
-//! The window and the worker know only this. An engine is opened by an [`Opener`], owned by the worker thread and
-//! never touched by the window, which reads the immutable [`Scene`] snapshots.
+//! Window and worker depend on nothing else, so that they can be tested with a substitute. An [`Opener`] makes an
+//! [`Engine`]. The worker thread owns it. The window reads immutable snapshots, the [`Scene`]s.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -11,21 +11,21 @@ use glam::DVec3;
 use plait_core::mesh::TriMesh;
 use plait_core::progress::{Cancelled, Progress};
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
-use plait_core::weave::{ElasticEnergy, Improvement};
+use plait_core::weave::{ElasticEnergy, FaceDistortion, Improvement};
 use thiserror::Error;
 
-/// Why the engine did not do what it was asked.
+/// Why an operation of the engine failed. The design is unchanged.
 #[derive(Debug, Clone, Error)]
 pub enum EngineError {
-    /// Stopped from outside; nothing changed.
+    /// The operation was cancelled.
     #[error("cancelled")]
     Cancelled,
-    /// It could not be done; nothing changed.
+    /// The operation is not possible.
     #[error("{message}")]
     Failed {
-        /// What is wrong, in the user's words.
+        /// What is wrong, for the user.
         message: String,
-        /// Where on the model, if it has a place.
+        /// Where on the model, if the error has a place.
         place: Option<DVec3>,
     },
 }
@@ -43,7 +43,7 @@ impl From<Cancelled> for EngineError {
     }
 }
 
-/// What to open.
+/// A model or design to open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Source {
     /// A built-in model, by name.
@@ -53,7 +53,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// The name shown for it.
+    /// The name to show.
     pub fn name(&self) -> String {
         match self {
             Self::BuiltIn(name) => name.clone(),
@@ -67,7 +67,7 @@ impl Source {
 /// A built-in model as the menu lists it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BuiltIn {
-    /// What to open it by.
+    /// The name to open it by.
     pub name: String,
     /// A few words on its shape.
     pub hint: String,
@@ -75,65 +75,65 @@ pub struct BuiltIn {
 
 /// Opens engines.
 pub trait Opener: Send + Sync {
-    /// The built-in models; the first opens by default.
+    /// The built-in models. The first is the default.
     fn built_ins(&self) -> Vec<BuiltIn>;
     /// Reads and prepares a model, or a design with its model.
     ///
     /// # Errors
     ///
-    /// When the file is not a usable mesh or design, or the work was cancelled.
+    /// When the file is not a valid mesh or design, or the operation was cancelled.
     fn open(&self, source: &Source, progress: &Progress) -> Result<Box<dyn Engine>, EngineError>;
 }
 
-/// Names a placed strip for as long as the design lives.
+/// Identifies a placed strip, for the lifetime of the design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StripId(pub u32);
 
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// Its spine on the mesh that the engine weaves on.
+    /// Its spine on the mesh that is woven on, the design mesh or its proxy.
     pub curve: SurfaceCurve,
-    /// The lower, the better.
+    /// Elastica cost (section 8.2); lower is better.
     pub cost: f64,
-    /// Its elastic energy as it was found and as it is proposed, if it was a loop of the graph.
+    /// Elastic energy before and after relaxation; `None` for a curve that was not found in the elastica graph.
     pub energy: Option<ElasticEnergy>,
-    /// The spine in space; a closed one does not repeat its first point.
+    /// The spine on the design mesh. A closed one does not repeat its first point.
     pub polyline: Vec<DVec3>,
 }
 
-/// How a finished layout is written.
+/// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExportOptions {
-    /// How finely patches are refined into quads.
+    /// Size of the quads.
     pub refinement: Refinement,
 }
 
-/// How finely patches are refined.
+/// Size of the quads of an export.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refinement {
-    /// About so many quads in all.
+    /// Target number of quads.
     Quads(usize),
-    /// Quads of about this edge length, in the file's units.
+    /// Target edge length, in units of the file.
     EdgeLength(f64),
 }
 
-/// What an export wrote.
+/// The result of an export.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ExportReport {
-    /// The files, in the order written.
+    /// The files written.
     pub files: Vec<PathBuf>,
-    /// The result in a sentence.
+    /// Size of the layout in words.
     pub summary: String,
 }
 
-/// The interactive design of one layout. Every operation either takes place as a whole or changes nothing.
+/// The interactive design of one layout. An operation that fails changes nothing.
 ///
-/// All `Err` values are [`EngineError::Cancelled`], or a failure that says why.
+/// All errors are [`EngineError::Cancelled`], or a failure with its reason.
 #[allow(clippy::missing_errors_doc)] // said once, above
 pub trait Engine: Send {
-    /// The strips through a point of [`Scene::design_mesh`], best first; empty when there are none. A strip that is
-    /// found early, but not yet known to be the best, is handed to `first`.
+    /// The proposals through a point of [`Scene::design_mesh`], best first. `first` is called with a proposal found
+    /// early, before it is known to be the best.
     fn proposals(
         &mut self,
         at: SurfacePoint,
@@ -144,40 +144,40 @@ pub trait Engine: Send {
     fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError>;
     /// Removes a placed strip.
     fn remove(&mut self, strip: StripId, progress: &Progress) -> Result<(), EngineError>;
-    /// Takes back the last change.
+    /// Undoes the last change.
     fn undo(&mut self, progress: &Progress) -> Result<(), EngineError>;
-    /// Makes the change taken back last again.
+    /// Redoes the change undone last.
     fn redo(&mut self, progress: &Progress) -> Result<(), EngineError>;
     /// Shows or hides a strip; no change of the design.
     fn set_visible(&mut self, strip: StripId, visible: bool) -> Result<(), EngineError>;
-    /// The strip that helps most now; not yet placed.
+    /// The strip that resolves the most urgent problem. It is not placed yet.
     fn suggest(&mut self, progress: &Progress) -> Result<Proposal, EngineError>;
-    /// Tries other strips, with which the layout follows the shape better. Every change for the better is handed to `watch`
-    /// with a scene of it, which may break off: the best so far is then kept. One step of the history.
+    /// Searches for strips with a lower objective. Every improvement is passed to `watch` with its scene. When `watch`
+    /// breaks, the best strips so far are kept. All changes are one step of the history.
     fn improve(
         &mut self,
         watch: &mut dyn FnMut(Arc<Scene>, Improvement) -> ControlFlow<()>,
         progress: &Progress,
     ) -> Result<Improvement, EngineError>;
-    /// Weaves from now on with so much detail; the strips stay where they are.
+    /// Changes smoothing and curvature radius, and prepares the model again. The strips stay where they are.
     fn set_detail(&mut self, detail: Detail, progress: &Progress) -> Result<(), EngineError>;
-    /// Pins a part of the layout where it is, or lets it go; no change of the strips.
+    /// Pins or unpins a node or an arc of the layout.
     fn set_pinned(&mut self, part: LayoutPart, pinned: bool) -> Result<(), EngineError>;
-    /// Optimises the embedding of the layout. Every improvement is handed to `watch`, which may break off: the best so
-    /// far is then finished and kept. The result is forgotten when the strips change.
+    /// Optimises the embedding of the layout. Every improvement is passed to `watch`. When `watch` breaks, the best
+    /// embedding so far is completed and kept. A change of the strips discards the result.
     fn optimise(
         &mut self,
         watch: &mut dyn FnMut(EmbeddingStep) -> ControlFlow<()>,
         progress: &Progress,
     ) -> Result<(), EngineError>;
-    /// What is to be shown now.
+    /// The present scene.
     fn scene(&self) -> Arc<Scene>;
-    /// Adds to the scene something that takes long and may come later, such as stripes or the layout; returns whether
-    /// the scene changed, and is called until it did not.
+    /// Computes a part of the scene that was left out because it takes long, such as the layout. To be called until it
+    /// returns false: the scene is then complete.
     fn complete(&mut self, progress: &Progress) -> Result<bool, EngineError>;
-    /// Writes the design.
+    /// Writes the design to a file.
     fn save(&self, path: &Path) -> Result<(), EngineError>;
-    /// Writes the finished layout into a folder; refuses while a region is red.
+    /// Writes the layout to a folder. Fails while a region is red.
     fn export(
         &mut self,
         folder: &Path,
@@ -186,59 +186,59 @@ pub trait Engine: Send {
     ) -> Result<ExportReport, EngineError>;
 }
 
-/// A snapshot of a design, as the window shows it.
+/// A snapshot of a design.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The model.
     pub model: Arc<ModelFacts>,
-    /// The mesh that is pointed at; the same value as long as the model is the same.
+    /// The mesh of the design, on which points are picked. Shared by all scenes of a model.
     pub design_mesh: Arc<TriMesh>,
-    /// Finds points of the design mesh.
+    /// Spatial index of the design mesh.
     pub index: Arc<SurfaceIndex>,
-    /// What is drawn.
+    /// The triangles to draw.
     pub surface: Arc<DisplaySurface>,
-    /// Placed strips in order.
+    /// Placed strips, in order.
     pub strips: Vec<Strip>,
-    /// What remains to be done, most urgent first; empty when nothing does.
+    /// Problems of the design, most urgent first.
     pub remarks: Vec<Remark>,
-    /// Where the design stands, in one sentence: "Ready to export: 14 patches, 16 nodes (8 irregular)".
+    /// Size of the layout, "Ready to export: 14 patches, 16 nodes (8 irregular)"; empty while it is not valid.
     pub summary: String,
-    /// Whether the layout is valid and can leave.
+    /// Whether the layout is valid.
     pub exportable: bool,
-    /// The layout, once it is valid.
+    /// The layout, if it is valid.
     pub layout: Option<Arc<LayoutPreview>>,
-    /// What was optimised, if the layout shown is.
+    /// Quality of the optimised embedding; `None` while the initial embedding is shown.
     pub embedding: Option<Arc<EmbeddingSummary>>,
-    /// With how much detail is woven.
+    /// Smoothing and curvature radius.
     pub detail: Detail,
-    /// Whether there is a change to take back.
+    /// Whether there is a change to undo.
     pub can_undo: bool,
-    /// Whether there is one to make again.
+    /// Whether there is a change to redo.
     pub can_redo: bool,
 }
 
-/// What relief of the surface guides strips. Both are fractions of the model's size, its bounding-box diagonal.
+/// The scale of the features that strips follow. Both lengths are fractions of the bounding-box diagonal.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Detail {
-    /// Radius of the ball over which curvature is taken.
+    /// Radius of the ball over which curvature is estimated.
     pub curvature_radius: f64,
-    /// Relief smaller than this is smoothed away for weaving; 0: none is.
+    /// Smoothing radius of the mesh that is woven on; 0: no smoothing.
     pub smoothing: f64,
 }
 
-/// What is known of a model.
+/// Name, size and repairs of a model.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ModelFacts {
     /// Its name.
     pub name: String,
     /// Pairs such as ("Triangles", "13 568").
     pub facts: Vec<(String, String)>,
-    /// What was repaired on reading, in words.
+    /// The repairs made on reading, in words.
     pub repairs: Vec<String>,
 }
 
-/// The triangles to draw, perhaps finer than the design mesh. Arrays per face have one entry for each of `faces`; what
-/// does not change with the strips is shared by the snapshots of a large mesh.
+/// The triangles to draw, a refinement of the design mesh. Arrays per face have one entry for each of `faces`. Arrays
+/// that do not depend on the strips are shared between scenes where possible.
 #[derive(Debug, Clone, Default)]
 pub struct DisplaySurface {
     /// Positions.
@@ -249,62 +249,62 @@ pub struct DisplaySurface {
     pub normals: Arc<Vec<[DVec3; 3]>>,
     /// The triangle of the design mesh that each face lies in.
     pub base: Arc<Vec<u32>>,
-    /// The colour of the region of each face; empty when there are no regions yet.
+    /// The colour of the region of each face; empty without strips.
     pub regions: Vec<RegionColour>,
-    /// The stripe pattern of each face along both families; empty when there is no strip map.
+    /// The stripe pattern of each face along both families of isolines; empty without a strip map.
     pub stripes: Vec<[Option<Stripes>; 2]>,
 }
 
-/// The lines of the stripe pattern that run along one strip through one face.
+/// The stripe pattern of one strip on one face: lines parallel to the spine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stripes {
-    /// At each corner the distance from the strip's spine, positive on its left, counted in lines of the pattern.
+    /// At each corner the signed distance to the spine in units of the line spacing, positive on the left.
     pub at: [f64; 3],
-    /// How many lines the strip has on the left and on the right of its spine; it ends with the last of them.
+    /// Number of lines on the left and on the right of the spine. The strip ends at the last one.
     pub reach: [u8; 2],
 }
 
-/// How urgent a region is.
+/// How urgent the problem of a region is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum RegionColour {
-    /// Nothing to remark.
+    /// No problem.
     #[default]
     None,
-    /// Its valence does not fit its curvature.
+    /// The valence of its node does not match its curvature.
     Yellow,
-    /// It has several corners.
+    /// It contains several corners of the shape, or its node has valence 2.
     Orange,
-    /// It is not a disc.
+    /// It is not a disc, or has too few corners: the layout is not valid.
     Red,
 }
 
 /// A placed strip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strip {
-    /// Its name.
+    /// Its identifier.
     pub id: StripId,
-    /// The spine; a closed one does not repeat its first point.
+    /// The spine on the design mesh. A closed one does not repeat its first point.
     pub polyline: Vec<DVec3>,
-    /// Whether it closes.
+    /// Whether the spine is closed.
     pub closed: bool,
-    /// Length of the spine, in the file's units.
+    /// Length of the spine, in units of the file.
     pub length: f64,
     /// Whether it is shown.
     pub visible: bool,
 }
 
-/// Something that remains to be done.
+/// A problem of the design or the embedding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
-    /// How urgent.
-    pub color: RegionColour,
-    /// In words: "3 regions are not discs".
+    /// How urgent it is.
+    pub colour: RegionColour,
+    /// The problem in words: "3 regions have several borders".
     pub text: String,
-    /// Where the first of them is.
+    /// The place of the first occurrence.
     pub place: Option<DVec3>,
 }
 
-/// A part of a layout that can be pinned, by its place in [`LayoutPreview`].
+/// A node or an arc of a layout, by its index in [`LayoutPreview`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LayoutPart {
     /// A node.
@@ -313,7 +313,7 @@ pub enum LayoutPart {
     Arc(usize),
 }
 
-/// The layout in space.
+/// Nodes and arcs of a layout in space.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LayoutPreview {
     /// Arcs, each from node to node.
@@ -323,7 +323,7 @@ pub struct LayoutPreview {
 }
 
 impl LayoutPreview {
-    /// Whether a part is pinned; `None` where there is no such part.
+    /// Whether a node or an arc is pinned; `None` if there is no such part.
     pub fn is_pinned(&self, part: LayoutPart) -> Option<bool> {
         match part {
             LayoutPart::Node(i) => self.nodes.get(i).map(|n| n.pinned),
@@ -331,7 +331,7 @@ impl LayoutPreview {
         }
     }
 
-    /// The pinned nodes, then the pinned arcs.
+    /// The pinned nodes, followed by the pinned arcs.
     pub fn pinned(&self) -> Vec<LayoutPart> {
         let nodes = (0..self.nodes.len()).map(LayoutPart::Node);
         let parts = nodes.chain((0..self.arcs.len()).map(LayoutPart::Arc));
@@ -342,74 +342,61 @@ impl LayoutPreview {
 /// An arc of the layout.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LayoutArc {
-    /// From node to node.
+    /// Points from one node to the other.
     pub points: Vec<DVec3>,
-    /// Whether it only shows about where it will be, while the map has folds in its way.
-    pub sketched: bool,
-    /// Whether it is to stay where it is.
+    /// Whether the points are an approximation: flipped triangles prevent isoline tracing.
+    pub approximate: bool,
+    /// Whether it is pinned.
     pub pinned: bool,
 }
 
 /// A node of the layout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayoutNode {
-    /// Where.
+    /// Position.
     pub position: DVec3,
-    /// Number of arcs that end there.
+    /// Number of incident arc ends.
     pub valence: u32,
-    /// Whether the valence is other than 4 inside, 3 on the boundary.
+    /// Whether the valence differs from 4, on the boundary from 3.
     pub irregular: bool,
-    /// Whether it is to stay where it is.
+    /// Whether it is pinned.
     pub pinned: bool,
 }
 
-/// An embedding on its way.
+/// A step of the optimisation of an embedding.
 #[derive(Debug, Clone)]
 pub struct EmbeddingStep {
-    /// Steps made so far.
+    /// Number of steps so far.
     pub step: usize,
-    /// The energy as a fraction of that with which its phase began: least squares, then maps without folds.
+    /// Energy relative to the start of the phase: first least squares, then locally injective maps.
     pub energy: f64,
-    /// Triangles that the map turns over.
+    /// Number of flipped triangles.
     pub flipped: usize,
-    /// The layout as it is now.
+    /// The layout after this step.
     pub layout: LayoutPreview,
 }
 
-/// An optimised embedding in figures.
+/// Quality of an optimised embedding.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EmbeddingSummary {
-    /// Steps made.
+    /// Number of steps.
     pub steps: usize,
-    /// Energy over the area of the surface, at the start and in the end.
+    /// Energy divided by the area of the surface, before and after.
     pub energy: [f64; 2],
-    /// Triangles turned over at the start and in the end.
+    /// Number of flipped triangles, before and after.
     pub flipped: [usize; 2],
-    /// Mean conformal distortion of the patches' maps, 2 at best.
+    /// Mean conformal distortion of the patch maps; 2 at best.
     pub conformal: f64,
-    /// Mean deviation of the patches' isolines from principal directions, in degrees.
+    /// Mean angle between isolines and principal directions, in degrees.
     pub alignment: f64,
-    /// How far quads along the isolines are from flat, 0 at best.
+    /// Deviation of quads along isolines from planarity; 0 at best.
     pub planar: f64,
-    /// Longer over shorter side of the most oblong patch, and its middle.
+    /// The largest aspect ratio of a patch, and the centre of that patch.
     pub aspect: (f64, DVec3),
-    /// Sharp edges on isolines, sharp edges in all, and the middle of the first that is not on one.
+    /// Number of feature edges on isolines, number of all, and the midpoint of the first that is not on an isoline.
     pub features: (usize, usize, Option<DVec3>),
-    /// What could not be unfolded, in words.
-    pub folds: Vec<Remark>,
-    /// What the maps do to each triangle of the design mesh.
-    pub triangles: Vec<TriangleDistortion>,
-}
-
-/// What the maps of the patches do to one triangle of the design mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TriangleDistortion {
-    /// Mean conformal distortion, 2 at best.
-    pub conformal: f64,
-    /// Mean deviation from principal directions, in degrees, 0 to 45.
-    pub deviation: f64,
-    /// How pronounced the principal directions are, from 0 (not at all) to 1.
-    pub anisotropy: f64,
-    /// Whether some part of it is turned over.
-    pub flipped: bool,
+    /// Remaining flipped triangles, by reason.
+    pub flip_remarks: Vec<Remark>,
+    /// Distortion of each triangle of the design mesh.
+    pub triangles: Vec<FaceDistortion>,
 }

@@ -1,26 +1,26 @@
-//! From what the pointer does over the 3D view to what the user means by it.
+//! Translates pointer events over the 3D view to intents, by a state machine without a window.
 //!
-//! A small state machine without a window. Left click places, or pins a part of the layout; left or middle drag orbits; right drag or middle drag
-//! with Shift pans; the wheel browses over the surface and zooms over the background or with Ctrl. Positions in
-//! points from the view's top left corner.
+//! A left click places a strip, or pins a node or an arc. Left or middle drag orbits, right drag or Shift with middle
+//! drag pans. The wheel browses proposals over the surface, and zooms over the background or with Ctrl. Positions are
+//! in points from the top left corner of the view.
 
 use glam::Vec2;
 
-/// A press that moves no farther than this, in points, is a click.
+/// Largest movement of a click, in points; beyond, it is a drag.
 const CLICK_SLOP: f32 = 4.0;
-/// How far a touchpad scrolls, in points, for what one notch of a wheel does.
+/// Points that a touchpad scrolls for one notch of a wheel.
 const POINTS_PER_NOTCH: f32 = 40.0;
-/// Zoom of one notch.
+/// Factor of the camera's distance for one notch.
 const ZOOM_PER_NOTCH: f32 = 0.88;
 
-/// Which button.
+/// A button of the pointer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Button {
-    /// Usually the left one.
+    /// The left one, unless buttons are swapped.
     Primary,
     /// The wheel.
     Middle,
-    /// Usually the right one.
+    /// The right one, unless buttons are swapped.
     Secondary,
 }
 
@@ -33,16 +33,16 @@ pub struct Held {
     pub ctrl: bool,
 }
 
-/// What the pointer did.
+/// An event of the pointer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PointerEvent {
-    /// It is at a position now.
+    /// It moved to a position.
     Moved(Vec2),
     /// It left the view or the window.
     Gone,
-    /// A button went down.
+    /// A button was pressed.
     Pressed(Button, Vec2, Held),
-    /// A button went up.
+    /// A button was released.
     Released(Button, Vec2),
     /// The wheel turned: notches, positive away from the user.
     Wheel(f32, Held),
@@ -55,7 +55,7 @@ pub enum PointerEvent {
 /// What the pointer is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Under {
-    /// Nothing.
+    /// No surface.
     Background,
     /// The surface.
     Surface,
@@ -63,31 +63,31 @@ pub enum Under {
     Part,
 }
 
-/// What the user means.
+/// What the user wants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Intent {
-    /// Show what would be placed here.
+    /// Show the proposals at a position.
     Hover(Vec2),
-    /// Show nothing.
+    /// Show no proposals.
     Leave,
-    /// Go on by so many alternatives.
+    /// Show the proposal this many further on.
     Browse(i32),
-    /// Take what is shown here.
+    /// Place the proposal shown.
     Place(Vec2),
-    /// Pin what is here, or let it go.
+    /// Pin or unpin the node or arc under the pointer.
     Pin(Vec2),
-    /// Turn the view by a drag.
+    /// Rotate the view by a drag.
     Orbit(Vec2),
     /// Move the view by a drag.
     Pan(Vec2),
-    /// Come nearer (below 1) or recede, toward a position.
+    /// Zoom in (factor below 1) or out, about a position.
     Zoom(f32, Vec2),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drag {
     None,
-    /// Pressed, not yet moved beyond the slop.
+    /// Pressed, and not moved farther than [`CLICK_SLOP`].
     Pending {
         button: Button,
         from: Vec2,
@@ -102,7 +102,7 @@ enum Drag {
 pub struct Input {
     position: Option<Vec2>,
     drag: Drag,
-    /// Scrolling not yet worth a notch.
+    /// Scrolling that does not make a whole notch yet.
     scrolled: f32,
 }
 
@@ -113,17 +113,17 @@ impl Default for Input {
 }
 
 impl Input {
-    /// Whether a button is down: nothing is hovered then.
+    /// Whether a button is down.
     pub fn is_dragging(&self) -> bool {
         self.drag != Drag::None
     }
 
-    /// Where the pointer is, while it is over the view.
+    /// The position of the pointer, while it is over the view.
     pub fn position(&self) -> Option<Vec2> {
         self.position
     }
 
-    /// Takes in one event; `under` tells what the pointer is over now.
+    /// Handles one event; `under` is what the pointer is over.
     pub fn handle(&mut self, event: PointerEvent, under: Under) -> Option<Intent> {
         match event {
             PointerEvent::Moved(to) => self.moved(to),
@@ -188,7 +188,7 @@ impl Input {
             self.scrolled = 0.0;
             return Some(Intent::Zoom(ZOOM_PER_NOTCH.powf(notches.clamp(-8.0, 8.0)), at));
         }
-        // Toward the user goes on to the next, worse alternative, as a list would scroll down.
+        // Scrolling down goes to the next alternative, as in a list.
         self.scrolled -= notches;
         let whole = self.scrolled.trunc();
         self.scrolled -= whole;

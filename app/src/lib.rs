@@ -1,4 +1,4 @@
-//! The program `plait`: window, input, panels, drawing and command line around `plait-core`.
+//! The program `plait`: the window and the command line of `plait-core`.
 
 pub mod camera;
 pub mod cli;
@@ -6,7 +6,8 @@ pub mod distortion;
 pub mod engine;
 pub mod input;
 pub mod render;
+pub mod session_engine;
 pub mod shading;
-pub mod weaving;
+pub mod texts;
 pub mod window;
 pub mod worker;

@@ -1,34 +1,34 @@
-//! From an engine's snapshot to what the renderer draws: triangles with colours and stripes, lines, markers.
+//! Converts a scene of the engine to what the renderer draws: coloured and striped triangles, lines, markers.
 
 use glam::{DVec3, Vec3};
 
 use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId};
 use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
 
-/// Placed strips.
+/// Colour of placed strips.
 pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
-/// Placed strips beside a layout.
+/// Colour of placed strips while a layout is shown.
 const FAINT: [u8; 4] = [0x1f, 0x5f, 0xd0, 0x70];
-/// The selected strip.
+/// Colour of the selected strip.
 pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
-/// What a click would place.
+/// Colour of the proposal that a click would place.
 pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
-/// Arcs of the layout.
+/// Colour of arcs.
 pub const ARC: [u8; 4] = [0x24, 0x26, 0x2a, 0xff];
-/// Arcs that are only shown about where they will be.
-const SKETCHED: [u8; 4] = [0x24, 0x26, 0x2a, 0x78];
-/// Inside of a pinned arc.
-const CORE: [u8; 4] = [0xff, 0xff, 0xff, 0xff];
-/// Regular nodes of the layout.
+/// Colour of arcs that are approximate, see [`crate::engine::LayoutArc`].
+const APPROXIMATE: [u8; 4] = [0x24, 0x26, 0x2a, 0x78];
+/// Colour of the inner line of pinned arcs.
+const PINNED_CORE: [u8; 4] = [0xff, 0xff, 0xff, 0xff];
+/// Colour of regular nodes.
 pub const NODE: [u8; 4] = [0x5a, 0x5e, 0x66, 0xff];
-/// Irregular nodes of valence below and above the regular one.
+/// Colours of irregular nodes of lower and of higher valence.
 pub const IRREGULAR: [[u8; 4]; 2] = [[0xd2, 0x3c, 0x3c, 0xff], [0x25, 0x63, 0xc9, 0xff]];
-/// A pale seam that keeps a line apart from the stripes it runs on.
-const SEAM: [u8; 4] = [0xff, 0xff, 0xff, 0xb4];
+/// Colour of the outline that separates a line from the stripes around it.
+const OUTLINE: [u8; 4] = [0xff, 0xff, 0xff, 0xb4];
 
-/// The colour of a region as the panels show it.
-pub fn region_rgb(color: RegionColour) -> [u8; 3] {
-    match color {
+/// The colour of a region in the panels.
+pub fn region_rgb(colour: RegionColour) -> [u8; 3] {
+    match colour {
         RegionColour::None => [0x3d, 0x9b, 0x5f],
         RegionColour::Yellow => [0xe3, 0xc0, 0x1c],
         RegionColour::Orange => [0xee, 0x8a, 0x1d],
@@ -36,10 +36,10 @@ pub fn region_rgb(color: RegionColour) -> [u8; 3] {
     }
 }
 
-/// The wash over the surface: urgent colours wash more strongly.
-fn tint(color: RegionColour) -> [u8; 4] {
-    let [r, g, b] = region_rgb(color);
-    match color {
+/// The colour of a region on the surface; alpha is the strength over the material.
+fn tint(colour: RegionColour) -> [u8; 4] {
+    let [r, g, b] = region_rgb(colour);
+    match colour {
         RegionColour::None => [0; 4],
         RegionColour::Yellow => [r, g, b, 0x70],
         RegionColour::Orange => [r, g, b, 0x80],
@@ -47,7 +47,7 @@ fn tint(color: RegionColour) -> [u8; 4] {
     }
 }
 
-/// The surface as triangles, in the colours of its regions or those given for the triangles of the design mesh.
+/// The surface as triangles. `tints` are colours for the triangles of the design mesh; without, those of the regions.
 pub fn surface(display: &DisplaySurface, tints: Option<&[[u8; 4]]>) -> SurfaceMesh {
     let mut vertices = Vec::with_capacity(display.faces.len() * 3);
     let region = |f: usize| display.regions.get(f).map(|&c| tint(c));
@@ -73,15 +73,16 @@ pub fn surface(display: &DisplaySurface, tints: Option<&[[u8; 4]]>) -> SurfaceMe
     SurfaceMesh { vertices }
 }
 
-/// Points of the surface to frame it by: all of a small one, some of a large one.
+/// Points of the surface by which the camera frames it; a sample of large surfaces.
 pub fn framing_points(display: &DisplaySurface) -> Vec<Vec3> {
+    /// Points that suffice.
     const ENOUGH: usize = 20_000;
     let step = display.positions.len() / ENOUGH + 1;
     display.positions.iter().step_by(step).map(|p| p.as_vec3()).collect()
 }
 
-/// Normals at the corners of each face: the mean, weighted by angle, over neighbours that turn by less than
-/// `crease` (radians) against the face itself, so that sharp edges stay sharp.
+/// Normals at the corners of each face: the mean of the adjacent face normals, weighted by angle. Faces whose normals
+/// differ by `crease` (radians) or more are left out, so that sharp edges stay sharp.
 pub fn corner_normals(positions: &[DVec3], faces: &[[u32; 3]], crease: f64) -> Vec<[DVec3; 3]> {
     let normal = |f: &[u32; 3]| {
         let [a, b, c] = f.map(|v| positions[v as usize]);
@@ -94,19 +95,19 @@ pub fn corner_normals(positions: &[DVec3], faces: &[[u32; 3]], crease: f64) -> V
         starts[v + 1] += starts[v];
     }
     let mut next = starts.clone();
-    let mut around = vec![(0u32, 0.0f64); faces.len() * 3];
+    let mut adjacent = vec![(0u32, 0.0f64); faces.len() * 3];
     for (f, face) in faces.iter().enumerate() {
         for i in 0..3 {
             let [p, q, r] = [0, 1, 2].map(|k| positions[face[(i + k) % 3] as usize]);
             let v = face[i] as usize;
             let angle = (q - p).angle_between(r - p);
-            around[next[v] as usize] = (f as u32, if angle.is_finite() { angle } else { 0.0 });
+            adjacent[next[v] as usize] = (f as u32, if angle.is_finite() { angle } else { 0.0 });
             next[v] += 1;
         }
     }
     let limit = crease.cos();
     let at = |f: usize, v: u32| {
-        let list = &around[starts[v as usize] as usize..starts[v as usize + 1] as usize];
+        let list = &adjacent[starts[v as usize] as usize..starts[v as usize + 1] as usize];
         let smooth = list.iter().filter(|(g, _)| normals[f].dot(normals[*g as usize]) > limit);
         let sum: DVec3 = smooth.map(|&(g, angle)| normals[g as usize] * angle).sum();
         sum.try_normalize().unwrap_or(normals[f])
@@ -114,91 +115,92 @@ pub fn corner_normals(positions: &[DVec3], faces: &[[u32; 3]], crease: f64) -> V
     faces.iter().enumerate().map(|(f, face)| face.map(|v| at(f, v))).collect()
 }
 
-/// What is drawn over the surface.
+/// Everything that is drawn over the surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlay<'a> {
-    /// The design.
+    /// The scene.
     pub scene: &'a Scene,
-    /// What a click would place.
+    /// The proposal that a click would place.
     pub proposal: Option<&'a Proposal>,
     /// The strip selected in the list.
     pub selected: Option<StripId>,
-    /// Arcs and nodes.
+    /// Nodes and arcs.
     pub layout: Option<&'a LayoutPreview>,
-    /// Of these, what a click would pin or let go.
+    /// The node or arc that a click would pin or unpin.
     pub part: Option<LayoutPart>,
     /// Whether placed strips are shown.
     pub strips: bool,
-    /// A place that a message speaks of.
+    /// The place of a message.
     pub place: Option<DVec3>,
 }
 
 /// The lines and markers of an overlay.
-pub fn overlay(o: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
+pub fn overlay(overlay: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     let mut lines = Vec::new();
     let mut markers = Vec::new();
-    let layout = o.layout;
-    if o.strips {
-        for strip in o.scene.strips.iter().filter(|s| s.visible) {
-            let selected = o.selected == Some(strip.id);
+    let layout = overlay.layout;
+    if overlay.strips {
+        for strip in overlay.scene.strips.iter().filter(|s| s.visible) {
+            let selected = overlay.selected == Some(strip.id);
             let points = points(&strip.polyline);
             match (selected, layout) {
-                (true, _) => seamed(&mut lines, points, strip.closed, SELECTED, 4.5),
-                (false, None) => seamed(&mut lines, points, strip.closed, PLACED, 2.6),
-                // Beside a layout, strips step back.
+                (true, _) => outlined(&mut lines, points, strip.closed, SELECTED, 4.5),
+                (false, None) => outlined(&mut lines, points, strip.closed, PLACED, 2.6),
+                // Strips are faint while a layout is shown.
                 (false, Some(_)) => {
-                    lines.push(Polyline { points, closed: strip.closed, color: FAINT, width: 1.8, hidden: 0.0 });
+                    lines.push(Polyline { points, closed: strip.closed, colour: FAINT, width: 1.8, hidden: 0.0 });
                 }
             }
         }
     }
     if let Some(layout) = layout {
-        draw_layout(layout, o.part, &mut lines, &mut markers);
+        draw_layout(layout, overlay.part, &mut lines, &mut markers);
     }
-    if let Some(proposal) = o.proposal {
-        seamed(&mut lines, points(&proposal.polyline), proposal.curve.closed, PROPOSED, 3.6);
+    if let Some(proposal) = overlay.proposal {
+        outlined(&mut lines, points(&proposal.polyline), proposal.curve.closed, PROPOSED, 3.6);
     }
-    if let Some(place) = o.place {
+    if let Some(place) = overlay.place {
         let position = place.as_vec3().to_array();
-        markers.push(Marker { position, color: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5, square: false });
+        markers.push(Marker { position, colour: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5, square: false });
     }
     (lines, markers)
 }
 
 fn draw_layout(layout: &LayoutPreview, part: Option<LayoutPart>, lines: &mut Vec<Polyline>, markers: &mut Vec<Marker>) {
     let line =
-        |arc: &[DVec3], color, width, hidden| Polyline { points: points(arc), closed: false, color, width, hidden };
+        |arc: &[DVec3], colour, width, hidden| Polyline { points: points(arc), closed: false, colour, width, hidden };
     if let Some(LayoutPart::Arc(i)) = part
         && let Some(arc) = layout.arcs.get(i)
     {
         lines.push(line(&arc.points, PROPOSED, 8.0, 0.0));
     }
     for arc in layout.arcs.iter().filter(|a| a.points.len() > 1) {
-        let color = if arc.sketched { SKETCHED } else { ARC };
-        lines.push(line(&arc.points, color, if arc.pinned { 5.4 } else { 2.2 }, 0.10));
+        let colour = if arc.approximate { APPROXIMATE } else { ARC };
+        lines.push(line(&arc.points, colour, if arc.pinned { 5.4 } else { 2.2 }, 0.10));
         if arc.pinned {
-            lines.push(line(&arc.points, CORE, 2.0, 0.0));
+            lines.push(line(&arc.points, PINNED_CORE, 2.0, 0.0));
         }
     }
     for (i, node) in layout.nodes.iter().enumerate() {
-        let (color, radius): (_, f32) = match (node.irregular, node.valence < 4) {
+        let (colour, radius): (_, f32) = match (node.irregular, node.valence < 4) {
             (false, _) => (NODE, 3.4),
             (true, low) => (IRREGULAR[usize::from(!low)], 5.6),
         };
         let position = node.position.as_vec3().to_array();
-        // Large enough for the square's core to be seen.
+        // Large enough to show the core of the square.
         let radius = if node.pinned { 6.6 } else { radius };
-        let marker = Marker { position, color, radius, hidden: 0.12, square: node.pinned };
+        let marker = Marker { position, colour, radius, hidden: 0.12, square: node.pinned };
         if part == Some(LayoutPart::Node(i)) {
-            markers.push(Marker { color: PROPOSED, radius: radius + 4.0, ..marker.clone() });
+            markers.push(Marker { colour: PROPOSED, radius: radius + 4.0, ..marker.clone() });
         }
         markers.push(marker);
     }
 }
 
-fn seamed(lines: &mut Vec<Polyline>, points: Vec<[f32; 3]>, closed: bool, color: [u8; 4], width: f32) {
-    lines.push(Polyline { points: points.clone(), closed, color: SEAM, width: width + 2.4, hidden: 0.0 });
-    lines.push(Polyline { points, closed, color, width, hidden: 0.13 });
+/// A line with its outline.
+fn outlined(lines: &mut Vec<Polyline>, points: Vec<[f32; 3]>, closed: bool, colour: [u8; 4], width: f32) {
+    lines.push(Polyline { points: points.clone(), closed, colour: OUTLINE, width: width + 2.4, hidden: 0.0 });
+    lines.push(Polyline { points, closed, colour, width, hidden: 0.13 });
 }
 
 fn points(line: &[DVec3]) -> Vec<[f32; 3]> {
@@ -210,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sharp_edges_keep_their_normals_and_soft_ones_share() {
+    fn only_smooth_edges_share_normals() {
         let up = |z: f64| vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(-1.0, 0.0, z)];
         let faces = [[0, 1, 2], [0, 2, 3]];
         let soft = corner_normals(&up(0.1), &faces, 0.7);

@@ -1,11 +1,43 @@
-//! Small meshes and curves that many tests need.
+//! What tests of several rooms need: small meshes and curves, meshes beside the repository.
 
 use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::mesh::{HalfedgeId, LoadedMesh, TriMesh, load};
 use crate::surface::{Crossing, SurfaceCurve};
+
+/// Says that a test or a part of one is left out, and why.
+///
+/// # Panics
+///
+/// When the environment variable `PLAIT_TEST_ALL` is set: then everything a test needs has to be there.
+pub(crate) fn skip(reason: &str) {
+    assert!(std::env::var_os("PLAIT_TEST_ALL").is_none(), "PLAIT_TEST_ALL is set, but {reason}");
+    eprintln!("skipped: {reason}");
+}
+
+/// The folder of research meshes: `PLAIT_MESHES`, or `shared/meshes` beside the repository; else [`skip`].
+pub(crate) fn research_meshes() -> Option<PathBuf> {
+    let folder = std::env::var_os("PLAIT_MESHES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"), PathBuf::from);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    skip(&format!("there is no folder {}", folder.display()));
+    None
+}
+
+/// A research mesh as it is loaded, of bounding-box diagonal 1; where it is missing, [`skip`].
+pub(crate) fn research_mesh(file: &str) -> Option<LoadedMesh> {
+    let path = research_meshes()?.join(file);
+    if path.is_file() {
+        return Some(load(&path).expect("a research mesh can be read"));
+    }
+    skip(&format!("there is no {}", path.display()));
+    None
+}
 
 /// A grid of `n` × `m` cells, each of two triangles, closed or open in each direction, mapped by `map` from
 /// fractions of both directions. Cell `(i, j)` holds faces `2 (j n + i)` and the one after.

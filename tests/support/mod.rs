@@ -1,6 +1,10 @@
-//! What the acceptance tests share: calling the program, finding the meshes, an independent look at quads.
+//! What the acceptance tests share: calling the program, finding meshes, independent checks of what is written.
 
 #![allow(dead_code, reason = "every test uses its own part")]
+
+pub mod mesh_file;
+pub mod patches_file;
+pub mod replay;
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -11,22 +15,42 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
 }
 
-/// A folder beside the repository, or `None` with a note where it is missing.
+/// Says that a test or a part of one is left out, and why.
+///
+/// # Panics
+///
+/// When the environment variable `PLAIT_TEST_ALL` is set: then everything a test needs has to be there.
+pub fn skip(reason: &str) {
+    assert!(std::env::var_os("PLAIT_TEST_ALL").is_none(), "PLAIT_TEST_ALL is set, but {reason}");
+    eprintln!("skipped: {reason}");
+}
+
+/// A folder beside the repository; where it is missing, [`skip`].
 fn beside(folder: &str) -> Option<PathBuf> {
     let path = root().join("..").join("shared").join(folder);
     if path.is_dir() {
         return Some(path);
     }
-    eprintln!("note: skipped, there is no folder {}", path.display());
+    skip(&format!("there is no folder {}", path.display()));
     None
 }
 
-/// The folder of real meshes, or `None` with a note.
+/// The folder of research meshes: `PLAIT_MESHES`, or `shared/meshes` beside the repository; else [`skip`].
 pub fn meshes() -> Option<PathBuf> {
     match std::env::var_os("PLAIT_MESHES") {
         Some(folder) => Some(folder.into()),
         None => beside("meshes"),
     }
+}
+
+/// A research mesh; where it is missing, [`skip`].
+pub fn mesh(file: &str) -> Option<PathBuf> {
+    let path = meshes()?.join(file);
+    if path.is_file() {
+        return Some(path);
+    }
+    skip(&format!("there is no {}", path.display()));
+    None
 }
 
 /// Calls the program without a display.
@@ -57,7 +81,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Figures of a polygon mesh that was found to be an oriented manifold.
+/// The topology of an oriented manifold polygon mesh.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Shape {
     /// `V − E + F`.
@@ -66,7 +90,7 @@ pub struct Shape {
     pub boundary_loops: usize,
 }
 
-/// Polygons of an OBJ file that this program wrote.
+/// The polygons of an OBJ file that the program wrote.
 pub fn read_faces(path: &Path) -> Vec<Vec<u32>> {
     let number = |corner: &str| corner.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
     let text = std::fs::read_to_string(path).unwrap();
@@ -121,16 +145,16 @@ pub fn manifold(faces: &[Vec<u32>]) -> Shape {
     Shape { euler: around.len() as i64 - edges as i64 + faces.len() as i64, boundary_loops }
 }
 
-/// Figures of an independent judge of quad meshes, where it is there and can be run; else `None` with a note.
+/// The figures of an independent check of quad meshes; where it or what it needs is missing, [`skip`].
 ///
 /// # Panics
 ///
-/// If it finds the quads wrong.
+/// If the check fails.
 pub fn independent_check(quads: &Path, source: &Path) -> Option<serde_json::Value> {
     let script = beside("check")?.join("check_quads.py");
     let able = Command::new("python3").args(["-c", "import numpy, scipy"]).output();
     if !able.is_ok_and(|o| o.status.success()) {
-        eprintln!("note: skipped, the independent check needs python3 with numpy and scipy");
+        skip("the independent check needs python3 with numpy and scipy");
         return None;
     }
     let output = Command::new("python3").arg(script).args([quads, source]).arg("--json").output().unwrap();

@@ -9,12 +9,11 @@ use glam::DVec3;
 use plait_app::engine::{
     BuiltIn, Detail, DisplaySurface, EmbeddingStep, EmbeddingSummary, Engine, EngineError, ExportOptions, ExportReport,
     LayoutArc, LayoutNode, LayoutPart, LayoutPreview, Opener, Proposal, Scene, Source, Strip, StripId,
-    TriangleDistortion,
 };
 use plait_core::mesh::{TriMesh, builtin};
 use plait_core::progress::Progress;
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
-use plait_core::weave::{Fit, Improvement};
+use plait_core::weave::{FaceDistortion, Fit, Improvement};
 
 /// Opens a rounded cube, whatever is asked for. With one strip it has a layout; every strip is the same.
 pub struct StandIn;
@@ -150,8 +149,8 @@ impl Engine for Session {
             std::thread::sleep(Duration::from_millis(2));
         }
         self.layout = layout;
-        let good = TriangleDistortion { conformal: 2.0, deviation: 5.0, anisotropy: 1.0, flipped: false };
-        let bad = TriangleDistortion { conformal: 9.0, deviation: 44.0, anisotropy: 1.0, flipped: false };
+        let good = FaceDistortion { conformal: 2.0, deviation: 5.0, anisotropy: 1.0, flipped: false };
+        let bad = FaceDistortion { conformal: 9.0, deviation: 44.0, anisotropy: 1.0, flipped: false };
         let triangles = (0..self.mesh.n_faces()).map(|f| if f % 2 == 0 { good } else { bad }).collect();
         let summary = EmbeddingSummary {
             energy: [0.5, 0.25],

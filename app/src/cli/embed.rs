@@ -1,4 +1,4 @@
-//! `plait embed`: optimises the embedding of a design's layout, or of one from a layout file, and writes it.
+//! `plait embed`: optimises the embedding of the layout of a design or of a layout file, and exports it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,12 +8,14 @@ use std::time::Instant;
 use anyhow::Context as _;
 use plait_core::embed::{Next, Settings, Snapshot};
 use plait_core::progress::Progress;
-use plait_core::weave::{Export, OpenedLayout, Session, Times, initial_layout, write_all};
+use plait_core::weave::{OpenedLayout, Session, Times, initial_layout, write_all};
 
-use super::weave::{explain, export_options, open, say};
-use super::{DetailArguments, EmbedArguments, has_extension};
+use super::arguments::EmbedArguments;
+use super::arguments::options::DetailArguments;
+use super::input::{has_extension, open_session};
+use super::output::{explain, export_options, print_message, summary};
 
-/// Embeds and writes into the folder.
+/// Optimises the embedding and exports the layout to the folder.
 ///
 /// # Errors
 ///
@@ -25,12 +27,7 @@ pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
     let progress = &*interrupt.progress;
     let mut watch = |snapshot: &Snapshot| {
         if !arguments.quiet {
-            let Snapshot { step, flipped, energy, .. } = snapshot;
-            let percent = 100.0 * energy;
-            say(&format!(
-                "step {step}: energy {percent:.1} %, {flipped} folded, {:.1} s",
-                start.elapsed().as_secs_f64()
-            ));
+            print_step(snapshot, start);
         }
         interrupt.next()
     };
@@ -41,99 +38,78 @@ pub fn run(arguments: &EmbedArguments) -> anyhow::Result<()> {
         let written = layout.write_all(&options, &arguments.out, seconds(), progress, &mut watch)?;
         (layout.mesh().mesh.n_faces(), written.context("no layout was written")?)
     } else {
-        let mut session = open(&arguments.input, false, &DetailArguments::default(), progress)?;
+        let mut session = open_session(&arguments.input, false, &DetailArguments::default(), progress)?;
         pin(&mut session, arguments, progress)?;
         let written = write_all(&session, None, &options, &arguments.out, seconds(), progress, &mut watch)?;
         (session.model().loaded.mesh.n_faces(), written.map_err(|error| explain(&session, error))?)
     };
-    let name = arguments.input.file_name().map(Path::new).unwrap_or(&arguments.input);
-    say(&format!("{}: {faces} faces, {}, {:.1} s", name.display(), summary(&export), start.elapsed().as_secs_f64()));
+    let name = arguments.input.file_name().map(Path::new).unwrap_or(&arguments.input).display();
+    let elapsed = start.elapsed().as_secs_f64();
+    print_message(&format!("{name}: {faces} faces, {}, {elapsed:.1} s", summary(&export)));
     match export.optimised {
-        Some(Err(problem)) => anyhow::bail!("the rough drawing was written, since the optimisation failed: {problem}"),
+        Some(Err(error)) => anyhow::bail!("the optimisation failed, the initial embedding was written: {error}"),
         _ => Ok(()),
     }
 }
 
-fn settings(arguments: &EmbedArguments) -> anyhow::Result<Settings> {
-    let usual = Settings::default();
-    let anisotropy = arguments.anisotropy.unwrap_or(usual.anisotropy);
-    anyhow::ensure!(anisotropy.is_finite() && anisotropy >= 1.0, "the anisotropy must be 1 or more, not {anisotropy}");
-    let steps = arguments.steps.unwrap_or(usual.steps);
-    Ok(Settings { steps, anisotropy, sizing: usual.sizing && !arguments.no_sizing, ..usual })
+fn print_step(snapshot: &Snapshot, start: Instant) {
+    let Snapshot { step, flipped, energy, .. } = snapshot;
+    let (percent, elapsed) = (100.0 * energy, start.elapsed().as_secs_f64());
+    print_message(&format!("step {step}: energy {percent:.1} %, {flipped} flipped triangles, {elapsed:.1} s"));
 }
 
+fn settings(arguments: &EmbedArguments) -> anyhow::Result<Settings> {
+    let defaults = Settings::default();
+    let anisotropy = arguments.anisotropy.unwrap_or(defaults.anisotropy);
+    anyhow::ensure!(anisotropy.is_finite() && anisotropy >= 1.0, "--anisotropy must be at least 1, not {anisotropy}");
+    let steps = arguments.steps.unwrap_or(defaults.steps);
+    Ok(Settings { steps, anisotropy, sizing: defaults.sizing && !arguments.no_sizing, ..defaults })
+}
+
+/// Adds the pins of the command line to those of the design.
 fn pin(session: &mut Session, arguments: &EmbedArguments, progress: &Progress) -> anyhow::Result<()> {
     if arguments.pin_nodes.is_empty() && arguments.pin_arcs.is_empty() {
         return Ok(());
     }
-    let drawn = initial_layout(session, progress).map_err(|error| explain(session, error))?;
-    let mut parts = drawn.pinned(&session.design().pins);
+    let initial = initial_layout(session, progress).map_err(|error| explain(session, error))?;
+    let mut parts = initial.pinned(&session.design().pins);
     parts.pin(&arguments.pin_nodes, &arguments.pin_arcs)?;
-    session.set_pins(drawn.pins(&parts));
+    session.set_pins(initial.pins(&parts));
     Ok(())
 }
 
-/// What came of it, in figures.
-pub(super) fn summary(export: &Export) -> String {
-    let layout = &export.layout;
-    let mut text = format!(
-        "{} patches, {} nodes ({} irregular), {} quads",
-        layout.patches.len(),
-        layout.nodes.len(),
-        layout.n_irregular(),
-        export.quads.quads.len()
-    );
-    if let Some(Ok(report)) = &export.optimised {
-        let (before, after) = (report.energy_before, report.energy_after);
-        text += &format!(", energy {before:.4} to {after:.4} in {} steps", report.steps);
-        if !report.collapsed.is_empty() {
-            text += &format!(", {} chords collapsed", report.collapsed.len());
-        }
-    }
-    if let Some(Ok(report)) = &export.optimised
-        && report.features.all > 0
-    {
-        text += &format!(", {} of {} feature edges on isolines", report.features.on_isolines, report.features.all);
-    }
-    let m = export.measures();
-    text += &format!(
-        ", {} flipped, conformal {:.3}, planar {:.3}, alignment {:.2}°",
-        m.flipped, m.conformal, m.planar, m.alignment
-    );
-    if let (Some(Ok(_)), Some(b)) = (&export.optimised, export.before.measures) {
-        text += &format!(" (drawn: {:.3}, {:.3}, {:.2}°)", b.conformal, b.planar, b.alignment);
-    }
-    text
-}
-
-/// Ctrl-C: once to finish with the best so far, before there is anything or a second time to give up.
+/// Handling of Ctrl-C. During the optimisation the first one stops with the best embedding so far. Before the
+/// optimisation, and when pressed again, it cancels.
 struct Interrupt {
     progress: Arc<Progress>,
     state: Arc<AtomicU8>,
 }
 
-/// Nothing to keep yet, optimising, asked to finish.
+/// State of [`Interrupt`]: no step of the optimisation was made yet.
 const OPENING: u8 = 0;
-const MOVING: u8 = 1;
-const FINISHING: u8 = 2;
+/// The optimisation runs.
+const OPTIMISING: u8 = 1;
+/// Ctrl-C was pressed during the optimisation.
+const STOPPING: u8 = 2;
 
 impl Interrupt {
     fn listen() -> anyhow::Result<Self> {
         let this = Self { progress: Arc::new(Progress::new()), state: Arc::new(AtomicU8::new(OPENING)) };
         let (progress, state) = (Arc::clone(&this.progress), Arc::clone(&this.state));
         ctrlc::set_handler(move || {
-            if state.compare_exchange(MOVING, FINISHING, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
-                say("plait: finishing with the best so far; Ctrl-C again gives up");
+            if state.compare_exchange(OPTIMISING, STOPPING, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
+                print_message("plait: stopping with the best embedding so far; Ctrl-C again cancels");
             } else {
                 progress.cancel();
             }
         })
-        .context("Ctrl-C cannot be listened to")?;
+        .context("Ctrl-C cannot be handled")?;
         Ok(this)
     }
 
+    /// Whether the optimisation goes on after a step.
     fn next(&self) -> Next {
-        let before = self.state.compare_exchange(OPENING, MOVING, Ordering::Relaxed, Ordering::Relaxed);
-        if before == Err(FINISHING) { Next::Finish } else { Next::Continue }
+        let before = self.state.compare_exchange(OPENING, OPTIMISING, Ordering::Relaxed, Ordering::Relaxed);
+        if before == Err(STOPPING) { Next::Finish } else { Next::Continue }
     }
 }

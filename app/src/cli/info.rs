@@ -1,4 +1,4 @@
-//! `plait info`: what a mesh is, as text or as JSON on standard output.
+//! `plait info`: size, topology and repairs of a mesh, as text or JSON on standard output.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -8,9 +8,9 @@ use plait_core::mesh::{LoadedMesh, SHARP_DIHEDRAL, Topology, sharp_edges};
 use plait_core::weave::MeshSource;
 use serde::Serialize;
 
-use super::InfoArguments;
+use super::arguments::InfoArguments;
 
-/// The facts of a mesh.
+/// The facts of a mesh; the keys of the JSON output.
 #[derive(Debug, Serialize)]
 struct Facts {
     name: String,
@@ -21,6 +21,7 @@ struct Facts {
     genus: usize,
     boundary_loops: usize,
     euler_characteristic: i64,
+    /// Length of the bounding-box diagonal, in units of the file.
     diagonal: f64,
     sharp_edges: usize,
     repairs: Vec<String>,
@@ -66,7 +67,7 @@ impl Facts {
     }
 }
 
-/// Reads the mesh and writes its facts.
+/// Reads the mesh and prints its facts.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! `plait render`: a picture of a design, drawn as the window draws it.
+//! `plait render`: renders a design to a PNG file, as the window shows it.
 
 use std::sync::Arc;
 
@@ -6,25 +6,26 @@ use anyhow::Context as _;
 use glam::Vec2;
 use plait_core::progress::Progress;
 
-use super::RenderArguments;
+use super::arguments::RenderArguments;
+use super::input;
 use crate::camera::Camera;
 use crate::engine::{Opener, Scene};
 use crate::render::{Frame, SceneInput, Toggles, render_to_png};
 use crate::shading;
 
-/// Opens the design and writes its picture.
+/// Opens the design and renders it.
 ///
 /// # Errors
 ///
 /// When the design cannot be opened, there is no graphics driver, or the file cannot be written.
 pub fn run(arguments: &RenderArguments, opener: &dyn Opener) -> anyhow::Result<()> {
-    let source = super::source(&arguments.design, opener);
+    let source = input::source(&arguments.design, opener);
     let engine = opener.open(&source, &Progress::new()).with_context(|| format!("cannot open {}", source.name()))?;
     let frame = frame(&engine.scene(), arguments);
-    render_to_png(&frame, &arguments.out).with_context(|| format!("cannot draw {}", arguments.out.display()))
+    render_to_png(&frame, &arguments.out).with_context(|| format!("cannot render to {}", arguments.out.display()))
 }
 
-/// The whole model, with all that the window shows of it.
+/// The whole model, with everything that the window shows of it.
 fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
     let layout = scene.layout.as_deref();
     let overlay =
@@ -47,7 +48,7 @@ fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
         view: camera.uniforms(size),
         toggles: Toggles { wireframe: arguments.wireframe, ..Toggles::default() },
         size: arguments.size,
-        // Lines keep their weight relative to the picture, as on a screen 900 points high.
+        // Line widths scale with the picture; 900 points is the height of the window.
         pixels_per_point: size.min_element() / 900.0,
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures without a window or a display: the same renderer into a texture that is read back.
+//! Rendering without a window or a display, to a texture that is read back.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::renderer::{Frame, Renderer};
 
-/// Why no picture came out.
+/// Why rendering without a display failed.
 #[derive(Debug, Error)]
 pub enum HeadlessError {
     /// No Vulkan or OpenGL driver.
@@ -20,21 +20,22 @@ pub enum HeadlessError {
     Write(#[from] image::ImageError),
 }
 
-/// A device without a display, and a renderer on it.
+/// A graphics device without a display, and a renderer on it.
 pub struct Headless {
     device: wgpu::Device,
     queue: wgpu::Queue,
     renderer: Renderer,
 }
 
+/// Format of the picture.
 const OUTPUT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Headless {
-    /// Opens the first driver there is, a software one if need be.
+    /// Opens the default graphics driver, which may be a software renderer.
     ///
     /// # Errors
     ///
-    /// When the machine has none that works.
+    /// When no driver works.
     pub fn new() -> Result<Self, HeadlessError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle().with_env());
         let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
@@ -45,7 +46,7 @@ impl Headless {
         Ok(Self { device, queue, renderer })
     }
 
-    /// Draws one frame.
+    /// Renders one frame.
     ///
     /// # Errors
     ///
@@ -119,7 +120,7 @@ impl Headless {
     }
 }
 
-/// Draws one frame into a PNG file, without a display.
+/// Renders one frame to a PNG file.
 ///
 /// # Errors
 ///
@@ -142,7 +143,7 @@ mod tests {
 
     const SIZE: [u32; 2] = [200, 160];
 
-    /// A square in the plane z = 0, and what lies at depth `z` over its middle.
+    /// A square in the plane z = 0, with lines and markers.
     fn frame(stripes: bool, lines: Vec<Polyline>, markers: Vec<Marker>) -> Frame {
         let corner = |x: f32, y: f32| SurfaceVertex {
             position: [x, y, 0.0],
@@ -168,7 +169,7 @@ mod tests {
 
     fn line(z: f32, hidden: f32) -> Polyline {
         let points = vec![[-0.3, 0.0, z], [0.0, 0.0, z], [0.3, 0.0, z]];
-        Polyline { points, closed: false, color: [0, 255, 0, 255], width: 4.0, hidden }
+        Polyline { points, closed: false, colour: [0, 255, 0, 255], width: 4.0, hidden }
     }
 
     fn greens(picture: &image::RgbaImage) -> usize {
@@ -176,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_seen_before_the_surface_and_not_behind_it() {
+    fn lines_are_visible_in_front_of_the_surface_only() {
         let mut gpu = Headless::new().unwrap();
         let front = gpu.render(&frame(false, vec![line(0.0, 0.0)], vec![])).unwrap();
         // 0.6 units of a width of about 1.47 units on 200 pixels, four pixels wide.
@@ -188,10 +189,10 @@ mod tests {
     }
 
     #[test]
-    fn joints_do_not_cover_twice() {
+    fn joints_of_transparent_lines_are_not_drawn_twice() {
         let mut gpu = Headless::new().unwrap();
         let mut half = line(0.01, 0.0);
-        half.color[3] = 128;
+        half.colour[3] = 128;
         let whole = Polyline { points: vec![half.points[0], half.points[2]], ..half.clone() };
         let (jointed, whole) =
             (gpu.render(&frame(false, vec![half], vec![])), gpu.render(&frame(false, vec![whole], vec![])));
@@ -204,7 +205,7 @@ mod tests {
     fn markers_and_stripes_show() {
         let mut gpu = Headless::new().unwrap();
         let marker =
-            Marker { position: [0.1, 0.1, 0.0], color: [0, 255, 0, 255], radius: 6.0, hidden: 0.0, square: false };
+            Marker { position: [0.1, 0.1, 0.0], colour: [0, 255, 0, 255], radius: 6.0, hidden: 0.0, square: false };
         let marked = gpu.render(&frame(false, vec![], vec![marker.clone()])).unwrap();
         let disc = greens(&marked);
         assert!((50..130).contains(&disc), "{disc}");

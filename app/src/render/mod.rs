@@ -1,9 +1,9 @@
-//! Drawing: a lit, striped surface with lines and markers over it, through wgpu.
+//! The renderer: a lit, striped surface with lines and markers over it, through wgpu.
 //!
-//! The surface goes into an offscreen target (4× multisampled colour and depth) that is redrawn only when the
-//! scene, the camera or the size changed; [`Renderer::paint`] then composes backdrop, surface image, lines and
-//! markers into whatever pass it is given, the window's or that of [`render_to_png`]. The room knows neither
-//! the window nor the engine: it draws [`SceneInput`] values.
+//! The surface is drawn to an offscreen target (4× multisampled colour and depth), and only when the scene, the camera
+//! or the size has changed. [`Renderer::paint`] composes backdrop, surface image, lines and markers into a render pass,
+//! that of the window or that of [`render_to_png`]. The renderer depends on neither the window nor the engine: it draws
+//! [`SceneInput`] values.
 
 mod headless;
 mod pipelines;

@@ -1,9 +1,9 @@
-//! The pipelines and the layouts they share. Made once per device and output format.
+//! The render pipelines and their bind group layouts, made once per device and output format.
 
 use super::scene::{SurfaceVertex, ViewUniforms};
 use super::target;
 
-/// A segment of a line, one instance each.
+/// A segment of a line as `overlay.wgsl` reads it, one instance each. `style`: width in points, visibility when hidden.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SegmentInstance {
@@ -11,19 +11,21 @@ pub struct SegmentInstance {
     pub start: [f32; 3],
     pub end: [f32; 3],
     pub after: [f32; 3],
-    pub color: [u8; 4],
+    pub colour: [u8; 4],
     pub style: [f32; 2],
 }
 
-/// A marker, one instance each.
+/// A marker as `overlay.wgsl` reads it, one instance each. `style`: radius in points, visibility when hidden, 1 if
+/// square.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct MarkerInstance {
     pub position: [f32; 3],
-    pub color: [u8; 4],
+    pub colour: [u8; 4],
     pub style: [f32; 3],
 }
 
+/// The pipelines and the layouts of their bind groups.
 pub struct Pipelines {
     pub view_layout: wgpu::BindGroupLayout,
     pub target_layout: wgpu::BindGroupLayout,
@@ -55,7 +57,7 @@ impl Pipelines {
                 layouts: &[Some(&view_layout)],
                 buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
                 topology: wgpu::PrimitiveTopology::TriangleList,
-                color: target::COLOR,
+                colour: target::COLOUR,
                 blend: None,
                 offscreen: true,
             },
@@ -70,7 +72,7 @@ impl Pipelines {
                     layouts: &[Some(&view_layout), Some(&target_layout)],
                     buffer,
                     topology,
-                    color: output,
+                    colour: output,
                     blend,
                     offscreen: false,
                 },
@@ -132,6 +134,7 @@ fn target_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
+/// What distinguishes one pipeline from another.
 struct Recipe<'a> {
     label: &'a str,
     shader: &'a wgpu::ShaderModule,
@@ -139,9 +142,9 @@ struct Recipe<'a> {
     layouts: &'a [Option<&'a wgpu::BindGroupLayout>],
     buffer: Option<wgpu::VertexBufferLayout<'static>>,
     topology: wgpu::PrimitiveTopology,
-    color: wgpu::TextureFormat,
+    colour: wgpu::TextureFormat,
     blend: Option<wgpu::BlendState>,
-    /// Into the multisampled target with depth, or straight into the output.
+    /// Whether it draws to the multisampled target with depth, or to the output.
     offscreen: bool,
 }
 
@@ -165,7 +168,7 @@ fn pipeline(device: &wgpu::Device, recipe: &Recipe<'_>) -> wgpu::RenderPipeline 
             entry_point: Some(recipe.entries[1]),
             compilation_options: Default::default(),
             targets: &[Some(wgpu::ColorTargetState {
-                format: recipe.color,
+                format: recipe.colour,
                 blend: recipe.blend,
                 write_mask: wgpu::ColorWrites::ALL,
             })],

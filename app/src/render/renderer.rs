@@ -1,4 +1,4 @@
-//! The renderer: keeps what is on the GPU, redraws the surface only when something changed.
+//! Keeps buffers on the GPU, and redraws the surface only when something has changed.
 
 use std::sync::Arc;
 
@@ -9,15 +9,15 @@ use super::target::Target;
 /// One picture to draw.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// What.
+    /// What to draw.
     pub scene: SceneInput,
-    /// From where.
+    /// The view.
     pub view: ViewUniforms,
-    /// How the surface is drawn.
+    /// How to draw the surface.
     pub toggles: Toggles,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Scale of widths and radii.
+    /// Pixels per point: scale of line widths and marker radii.
     pub pixels_per_point: f32,
 }
 
@@ -30,19 +30,19 @@ pub struct Renderer {
     surface: Option<(Arc<SurfaceMesh>, Instances)>,
     lines: Option<(Arc<Vec<Polyline>>, Instances)>,
     markers: Option<(Arc<Vec<Marker>>, Instances)>,
-    /// What the target shows.
+    /// The view that the target shows.
     drawn: Option<ViewUniforms>,
     redraws: u64,
 }
 
-/// A buffer of vertices or instances, and how many of it are used.
+/// A buffer of vertices or instances, and the number in use.
 struct Instances {
     buffer: wgpu::Buffer,
     count: u32,
 }
 
 impl Instances {
-    /// Writes `data` into the buffer of `old` where it fits, else into a new one with room to grow.
+    /// Writes `data` to the buffer of `old` if it fits, else to a new one with a quarter more room.
     fn write<T: bytemuck::Pod>(old: Option<Self>, device: &wgpu::Device, queue: &wgpu::Queue, data: &[T]) -> Self {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let needed = bytes.len() as u64;
@@ -89,12 +89,12 @@ impl Renderer {
         }
     }
 
-    /// How often the surface was drawn so far.
+    /// How often the surface was drawn.
     pub fn redraws(&self) -> u64 {
         self.redraws
     }
 
-    /// Uploads what changed and redraws the surface if it has to be.
+    /// Uploads what has changed, and redraws the surface if necessary.
     pub fn prepare(
         &mut self,
         device: &wgpu::Device,
@@ -142,7 +142,7 @@ impl Renderer {
         }
     }
 
-    /// Composes the prepared picture into `pass`, whose viewport has the size of the frame.
+    /// Draws the prepared picture in `pass`, whose viewport has the size of the frame.
     pub fn paint(&self, pass: &mut wgpu::RenderPass<'_>) {
         let Some(target) = &self.target else { return };
         pass.set_bind_group(0, &self.view_group, &[]);
@@ -161,7 +161,7 @@ impl Renderer {
     }
 }
 
-/// Replaces `slot` by an upload of `new` unless it holds that very value; returns whether it did.
+/// Uploads `new` to `slot` unless it holds the same `Arc`. Returns whether it was uploaded.
 fn upload<T>(
     slot: &mut Option<(Arc<T>, Instances)>,
     new: &Arc<T>,
@@ -186,12 +186,16 @@ fn segments(line: &Polyline) -> impl Iterator<Item = SegmentInstance> {
             start: line.points[i],
             end: line.points[(i + 1) % n],
             after: line.points[after],
-            color: line.color,
+            colour: line.colour,
             style: [line.width, line.hidden],
         }
     })
 }
 
 fn marker(m: &Marker) -> MarkerInstance {
-    MarkerInstance { position: m.position, color: m.color, style: [m.radius, m.hidden, f32::from(u8::from(m.square))] }
+    MarkerInstance {
+        position: m.position,
+        colour: m.colour,
+        style: [m.radius, m.hidden, f32::from(u8::from(m.square))],
+    }
 }

@@ -1,10 +1,10 @@
-//! What can be drawn: plain values, positions in world space, colours in display (gamma) space.
+//! What the renderer draws, as plain data. Positions are in world space, colours in display (gamma) space.
 
 use std::sync::Arc;
 
 use glam::{Mat4, Vec3};
 
-/// A corner of a triangle as the surface shader reads it.
+/// A corner of a triangle as `surface.wgsl` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SurfaceVertex {
@@ -12,12 +12,12 @@ pub struct SurfaceVertex {
     pub position: [f32; 3],
     /// Normal; need not have unit length.
     pub normal: [f32; 3],
-    /// Colour that washes over the material, its strength in alpha.
+    /// Colour over the material; alpha is its strength.
     pub tint: [u8; 4],
-    /// Coordinates across the strips of both families: a line is drawn wherever one is a whole number.
+    /// Stripe coordinates of both families; lines are drawn at integers.
     pub stripe: [f32; 2],
-    /// For both families, up to which coordinate and down to which negative one the strip reaches; both zero where
-    /// none covers the triangle. The same at all corners of a triangle.
+    /// Largest stripe coordinate, and negated smallest, of the strip of each family; both 0 where no strip covers the
+    /// triangle. The same at all corners of a triangle.
     pub reach: [[u8; 2]; 2],
 }
 
@@ -28,18 +28,18 @@ pub struct SurfaceMesh {
     pub vertices: Vec<SurfaceVertex>,
 }
 
-/// A line of constant width on the screen.
+/// A polyline of constant width on the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
-    /// The points in order; a closed line does not repeat its first.
+    /// The points; a closed line does not repeat its first point.
     pub points: Vec<[f32; 3]>,
-    /// Whether the last point joins the first.
+    /// Whether the last point is joined to the first.
     pub closed: bool,
     /// Red, green, blue, alpha; not premultiplied.
-    pub color: [u8; 4],
+    pub colour: [u8; 4],
     /// Width in points.
     pub width: f32,
-    /// How much of its colour a part behind the surface keeps, from 0 to 1.
+    /// Opacity of the parts behind the surface, relative to those in front, 0 to 1.
     pub hidden: f32,
 }
 
@@ -49,16 +49,16 @@ pub struct Marker {
     /// Centre in world space.
     pub position: [f32; 3],
     /// Red, green, blue, alpha; not premultiplied.
-    pub color: [u8; 4],
+    pub colour: [u8; 4],
     /// Radius in points.
     pub radius: f32,
-    /// How much of its colour the marker keeps behind the surface, from 0 to 1.
+    /// Opacity behind the surface, relative to that in front, 0 to 1.
     pub hidden: f32,
     /// Whether it is a square with a pale core instead of a disc.
     pub square: bool,
 }
 
-/// Everything of one picture but the view. The parts are shared, and uploaded again only when they are others.
+/// Everything in a picture except the view. A part is uploaded again only if its `Arc` is another.
 #[derive(Debug, Clone, Default)]
 pub struct SceneInput {
     /// The surface.
@@ -69,7 +69,7 @@ pub struct SceneInput {
     pub markers: Arc<Vec<Marker>>,
 }
 
-/// What of the surface is drawn.
+/// Options of the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Toggles {
     /// The stripe pattern of the strips.
@@ -86,7 +86,7 @@ impl Default for Toggles {
     }
 }
 
-/// The view as the shaders read it.
+/// The view as the shaders read it (`View` in both files).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct ViewUniforms {
@@ -98,8 +98,8 @@ pub struct ViewUniforms {
 }
 
 impl ViewUniforms {
-    /// A perspective view: `clip_from_view` with depth from 0 (near) to 1 (far), a rigid `view_from_world`, the
-    /// distances of both planes. Size and toggles are filled in by the renderer.
+    /// A perspective view. `clip_from_view` maps depth to 0 (near) .. 1 (far); `view_from_world` is rigid; `near` and
+    /// `far` are the distances of the clipping planes. The renderer fills in size and toggles.
     pub fn new(clip_from_view: Mat4, view_from_world: Mat4, near: f32, far: f32) -> Self {
         let world_from_view = view_from_world.inverse();
         let axis = |i: usize| world_from_view.col(i).to_array();

@@ -1,13 +1,13 @@
-//! The offscreen target: multisampled colour and depth, and the resolved image.
+//! The offscreen target of the surface: multisampled colour and depth, and the resolved image.
 
-/// Samples per pixel; every backend offers four.
+/// Samples per pixel; every backend supports four.
 pub const SAMPLES: u32 = 4;
-/// Format of the surface image: display-encoded colour and coverage.
-pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Format of the depth that lines test themselves against.
+/// Format of the surface image: colour in display space, coverage in alpha.
+pub const COLOUR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Format of the depth buffer, which lines and markers are tested against.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Textures of one size and the bind group through which the overlay reads them.
+/// The textures, and the bind group by which the overlay reads them.
 pub struct Target {
     /// Width and height in pixels.
     pub size: [u32; 2],
@@ -33,8 +33,8 @@ impl Target {
             });
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
-        let multisampled = view("surface samples", COLOR, SAMPLES, wgpu::TextureUsages::empty());
-        let resolved = view("surface image", COLOR, 1, wgpu::TextureUsages::TEXTURE_BINDING);
+        let multisampled = view("surface samples", COLOUR, SAMPLES, wgpu::TextureUsages::empty());
+        let resolved = view("surface image", COLOUR, 1, wgpu::TextureUsages::TEXTURE_BINDING);
         let depth = view("surface depth", DEPTH, SAMPLES, wgpu::TextureUsages::TEXTURE_BINDING);
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("surface image and depth"),
@@ -47,7 +47,7 @@ impl Target {
         Self { size, multisampled, resolved, depth, bind_group }
     }
 
-    /// A pass that starts with clear colour and depth and leaves both to be read.
+    /// A render pass that clears colour and depth, and stores both.
     pub fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surface"),

@@ -1,30 +1,30 @@
-//! What the panels ask for. Panels are functions of the state that return actions; the window carries them out.
+//! The actions that panels and keys return, and the options of the view.
 
 use glam::DVec3;
 
-use crate::distortion::Colours;
+use crate::distortion::ColourMode;
 use crate::engine::{Detail, LayoutPart, Source, StripId};
 
-/// A wish of the user, from a button, a menu or a key.
+/// An action of the user, by a button, a menu or a key.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Ask for a file and open it.
+    /// Ask for a file, and open it.
     AskOpen,
-    /// Open this.
+    /// Open a model or a design.
     Open(Source),
-    /// Ask for a file and write the design.
+    /// Ask for a file, and write the design.
     AskSave,
-    /// Ask for a folder and write the layout.
+    /// Ask for a folder, and export the layout.
     AskExport,
-    /// How many quads an export has, about.
+    /// Set the target number of quads of an export.
     Quads(usize),
-    /// Take back.
+    /// Undo the last change, or discard the running search or optimisation.
     Undo,
-    /// Make again.
+    /// Redo the change undone last.
     Redo,
-    /// Place the strip that helps most.
+    /// Place the strip that resolves the most urgent problem.
     Suggest,
-    /// Try other strips, with which the layout follows the shape better.
+    /// Search for strips with a lower objective.
     Improve,
     /// Select a strip, or none.
     Select(Option<StripId>),
@@ -32,29 +32,29 @@ pub enum Action {
     Remove(StripId),
     /// Show or hide a strip.
     SetVisible(StripId, bool),
-    /// Choose how much detail is woven with; it is applied later.
+    /// Choose smoothing and curvature radius, without applying them.
     ChooseDetail(Detail),
-    /// Weave with the detail chosen.
+    /// Apply the chosen smoothing and curvature radius.
     ApplyDetail,
     /// Optimise the embedding of the layout.
     Optimise,
-    /// Stop what is made better step by step, and keep the best so far.
+    /// Stop the running search or optimisation, and keep its best result.
     Stop,
-    /// Pin a part of the layout, or let it go.
+    /// Pin or unpin a node or an arc.
     SetPinned(LayoutPart, bool),
-    /// Let all parts of the layout go.
+    /// Unpin all nodes and arcs.
     UnpinAll,
-    /// What the surface's colours tell.
-    Colours(Colours),
-    /// Look at the whole model.
+    /// Choose what the colours of the surface show.
+    ChooseColours(ColourMode),
+    /// Show the whole model.
     FrameAll,
     /// Look at a place.
     LookAt(DVec3),
     /// Turn a view option on or off.
     Toggle(ViewOption),
-    /// Stop what is being done.
+    /// Cancel the running operation.
     Cancel,
-    /// Put away a message.
+    /// Dismiss a message.
     Dismiss(u64),
     /// Open or close the list of shortcuts.
     Shortcuts(bool),
@@ -69,9 +69,9 @@ pub enum Action {
 pub enum ViewOption {
     /// The stripe pattern and the spines of placed strips.
     Stripes,
-    /// The colours of the regions.
+    /// The colours of regions with problems.
     Regions,
-    /// Arcs and nodes of a valid layout.
+    /// Nodes and arcs of a valid layout.
     Layout,
     /// Edges of the triangles.
     Wireframe,
@@ -80,7 +80,7 @@ pub enum ViewOption {
 }
 
 impl ViewOption {
-    /// All, in the order of the menu.
+    /// All options, in the order of the menu.
     pub const ALL: [Self; 5] = [Self::Stripes, Self::Regions, Self::Layout, Self::Wireframe, Self::ZUp];
 
     /// The name in the menu and its key.
@@ -128,7 +128,7 @@ impl ViewOptions {
         }
     }
 
-    /// Turns one of them over.
+    /// Turns one of them on or off.
     pub fn toggle(&mut self, option: ViewOption) {
         let value = match option {
             ViewOption::Stripes => &mut self.stripes,

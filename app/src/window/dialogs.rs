@@ -1,18 +1,18 @@
-//! File dialogs, on threads of their own so that the window goes on.
+//! File dialogs, on their own threads so that the window goes on.
 //!
-//! The system's dialog comes through the desktop portal. A machine without one answers "nothing chosen" at once;
-//! since nobody presses Cancel that fast, such an answer opens a plain dialog of our own instead.
+//! The dialog of the system is opened through the desktop portal. Without a portal it returns "nothing chosen" at once.
+//! Nobody presses Cancel that fast, so such an answer opens a dialog of our own.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-/// A dialog that comes back empty sooner was never shown.
+/// A system dialog that returns nothing within this time was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(400);
-/// What can be opened.
+/// File name extensions that can be opened.
 const OPENABLE: [&str; 5] = ["obj", "off", "ply", "stl", "plait"];
 
-/// What a dialog asks for.
+/// The purpose of a dialog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
     /// A mesh or design to read.
@@ -39,28 +39,28 @@ enum Answer {
     NoDialog(Asked),
 }
 
-/// The dialogs that are open.
+/// The open dialog, if any, and the paths chosen.
 pub struct Dialogs {
-    /// Name without extension to offer for a new file.
+    /// The name from which those of new files are made.
     pub suggested_name: String,
     sender: Sender<Answer>,
     receiver: Receiver<Answer>,
     waiting: bool,
-    plain: Option<Plain>,
+    own: Option<OwnDialog>,
     ready: Vec<(Asked, PathBuf)>,
 }
 
 impl Default for Dialogs {
     fn default() -> Self {
         let (sender, receiver) = channel();
-        Self { suggested_name: String::new(), sender, receiver, waiting: false, plain: None, ready: Vec::new() }
+        Self { suggested_name: String::new(), sender, receiver, waiting: false, own: None, ready: Vec::new() }
     }
 }
 
 impl Dialogs {
     /// Opens a dialog unless one is open.
     pub fn ask(&mut self, asked: Asked, ctx: &egui::Context) {
-        if self.waiting || self.plain.is_some() {
+        if self.waiting || self.own.is_some() {
             return;
         }
         let (sender, ctx, name) = (self.sender.clone(), ctx.clone(), self.file_name(asked));
@@ -76,13 +76,13 @@ impl Dialogs {
         };
         match std::thread::Builder::new().name("dialog".into()).spawn(run) {
             Ok(_) => self.waiting = true,
-            Err(_) => self.plain = Some(Plain::new(asked, &self.file_name(asked))),
+            Err(_) => self.own = Some(OwnDialog::new(asked, &self.file_name(asked))),
         }
     }
 
-    /// Whether a dialog of our own holds the keyboard.
+    /// Whether our own dialog is open, which takes the keyboard.
     pub fn is_open(&self) -> bool {
-        self.plain.is_some()
+        self.own.is_some()
     }
 
     fn file_name(&self, asked: Asked) -> String {
@@ -95,29 +95,29 @@ impl Dialogs {
         }
     }
 
-    /// What was chosen since the last call.
+    /// The paths chosen since the last call.
     pub fn answers(&mut self) -> Vec<(Asked, PathBuf)> {
         while let Ok(answer) = self.receiver.try_recv() {
             self.waiting = false;
             match answer {
                 Answer::Chosen(asked, path) => self.ready.push((asked, path)),
                 Answer::NothingChosen => {}
-                Answer::NoDialog(asked) => self.plain = Some(Plain::new(asked, &self.file_name(asked))),
+                Answer::NoDialog(asked) => self.own = Some(OwnDialog::new(asked, &self.file_name(asked))),
             }
         }
         std::mem::take(&mut self.ready)
     }
 
-    /// Draws the plain dialog, if it is open.
+    /// Shows our own dialog, if it is open.
     pub fn show(&mut self, ctx: &egui::Context) {
-        let Some(plain) = &mut self.plain else { return };
-        match plain.show(ctx) {
+        let Some(own) = &mut self.own else { return };
+        match own.show(ctx) {
             Some(Some(path)) => {
-                self.ready.push((plain.asked, path));
-                self.plain = None;
+                self.ready.push((own.asked, path));
+                self.own = None;
                 ctx.request_repaint();
             }
-            Some(None) => self.plain = None,
+            Some(None) => self.own = None,
             None => {}
         }
     }
@@ -132,34 +132,34 @@ fn system_dialog(asked: Asked, name: &str) -> Option<PathBuf> {
     }
 }
 
-/// A plain dialog: a folder's entries and a line for the path.
-struct Plain {
+/// Our own dialog: the entries of a folder, and a text field for the name.
+struct OwnDialog {
     asked: Asked,
     folder: PathBuf,
     name: String,
     entries: Vec<(String, bool)>,
-    trouble: Option<String>,
-    /// Whether the name line already got the keyboard.
+    error: Option<String>,
+    /// Whether the text field has been focused.
     focused: bool,
 }
 
-impl Plain {
+impl OwnDialog {
     fn new(asked: Asked, name: &str) -> Self {
         let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("/"));
-        let mut plain =
-            Self { asked, folder, name: name.to_owned(), entries: Vec::new(), trouble: None, focused: false };
-        plain.list();
-        plain
+        let mut dialog =
+            Self { asked, folder, name: name.to_owned(), entries: Vec::new(), error: None, focused: false };
+        dialog.list();
+        dialog
     }
 
-    /// Reads the folder: sub-folders, then the files that can be opened.
+    /// Lists the folder: first the sub-folders, then the files that can be opened.
     fn list(&mut self) {
         self.entries.clear();
-        self.trouble = None;
+        self.error = None;
         let read = match std::fs::read_dir(&self.folder) {
             Ok(read) => read,
             Err(e) => {
-                self.trouble = Some(format!("{} cannot be read: {e}", self.folder.display()));
+                self.error = Some(format!("{} cannot be read: {e}", self.folder.display()));
                 return;
             }
         };
@@ -183,7 +183,7 @@ impl Plain {
         self.list();
     }
 
-    /// The path that the name line means: a folder is entered, unless a folder is what is asked for.
+    /// The path of the text field. A folder is entered instead, unless the dialog asks for a folder.
     fn accept(&mut self) -> Option<PathBuf> {
         let path = self.folder.join(self.name.trim());
         if self.asked != Asked::Export && path.is_dir() {
@@ -192,13 +192,13 @@ impl Plain {
             return None;
         }
         if self.asked == Asked::Open && !path.is_file() {
-            self.trouble = Some(format!("There is no file {}", path.display()));
+            self.error = Some(format!("There is no file {}", path.display()));
             return None;
         }
         Some(path)
     }
 
-    /// `Some(Some(path))` when chosen, `Some(None)` when cancelled.
+    /// Shows the dialog. `Some(Some(path))`: chosen; `Some(None)`: cancelled.
     fn show(&mut self, ctx: &egui::Context) -> Option<Option<PathBuf>> {
         let mut result = None;
         let frame = egui::Frame::window(&ctx.global_style()).inner_margin(18.0);
@@ -227,8 +227,8 @@ impl Plain {
                     line.request_focus();
                 }
             });
-            if let Some(trouble) = &self.trouble {
-                ui.colored_label(super::theme::BAD, trouble);
+            if let Some(error) = &self.error {
+                ui.colored_label(super::theme::BAD, error);
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let verb = match self.asked {

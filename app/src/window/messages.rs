@@ -1,35 +1,35 @@
-//! Messages that lie over the view until they are put away; good news goes by itself.
+//! Messages over the view. Errors stay until they are dismissed, all others disappear after some seconds.
 
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-/// How long good news and notes stay.
-const STAY: Duration = Duration::from_secs(8);
-/// More than these would cover the view.
-const MOST: usize = 4;
+/// How long messages other than errors stay.
+const DURATION: Duration = Duration::from_secs(8);
+/// Most messages at a time; the oldest is dropped. More would cover the view.
+const MAX_MESSAGES: usize = 4;
 
-/// How a message is meant.
+/// The kind of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
-    /// Something was done.
+    /// An operation succeeded.
     Done,
-    /// Something to know.
+    /// A note.
     Note,
-    /// Something could not be done.
+    /// An operation failed.
     Failed,
 }
 
 /// One message.
 #[derive(Debug, Clone)]
 pub struct Message {
-    /// Names it.
+    /// Its identifier.
     pub id: u64,
-    /// How it is meant.
+    /// Its kind.
     pub tone: Tone,
-    /// What it says.
+    /// Its text.
     pub text: String,
-    /// The place it speaks of.
+    /// The place on the model that it is about.
     pub place: Option<DVec3>,
     until: Option<Instant>,
 }
@@ -42,28 +42,28 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Adds a message; failures stay until they are dismissed.
+    /// Adds a message, in place of an older one with the same text.
     pub fn add(&mut self, tone: Tone, text: String, place: Option<DVec3>) {
         self.list.retain(|m| m.text != text);
         self.next += 1;
-        let until = (tone != Tone::Failed).then(|| Instant::now() + STAY);
+        let until = (tone != Tone::Failed).then(|| Instant::now() + DURATION);
         self.list.push(Message { id: self.next, tone, text, place, until });
-        if self.list.len() > MOST {
+        if self.list.len() > MAX_MESSAGES {
             self.list.remove(0);
         }
     }
 
-    /// Puts one away.
+    /// Removes a message.
     pub fn dismiss(&mut self, id: u64) {
         self.list.retain(|m| m.id != id);
     }
 
-    /// Puts all away.
+    /// Removes all messages.
     pub fn clear(&mut self) {
         self.list.clear();
     }
 
-    /// Those to show now, and when the next one goes.
+    /// The messages to show, and the time until the next one disappears.
     pub fn current(&mut self) -> (Vec<Message>, Option<Duration>) {
         let now = Instant::now();
         self.list.retain(|m| m.until.is_none_or(|u| u > now));

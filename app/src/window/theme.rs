@@ -1,32 +1,32 @@
-//! The look: light, warm neutrals, one accent, type of 14 points.
+//! Colours, spacing and font sizes of the window: light, with one accent colour.
 
 use egui::{Color32, CornerRadius, FontFamily, FontId, Shadow, Stroke, TextStyle, Visuals, vec2};
 
-/// Panels.
+/// Background of panels.
 pub const PANEL: Color32 = Color32::from_rgb(0xf8, 0xf7, 0xf5);
-/// Bars above and below.
+/// Background of menu bar and status bar.
 pub const BAR: Color32 = Color32::from_rgb(0xf0, 0xef, 0xec);
-/// Cards, menus, buttons.
+/// Background of cards, menus and buttons.
 pub const RAISED: Color32 = Color32::from_rgb(0xff, 0xff, 0xff);
-/// Hairlines.
+/// Thin lines.
 pub const LINE: Color32 = Color32::from_rgb(0xdf, 0xdc, 0xd6);
 /// Text.
 pub const TEXT: Color32 = Color32::from_rgb(0x1d, 0x1f, 0x23);
-/// Text that may be passed over.
+/// Secondary text.
 pub const QUIET: Color32 = Color32::from_rgb(0x63, 0x66, 0x6c);
-/// The accent, which is also the colour of placed strips.
+/// The accent colour, also that of placed strips.
 pub const ACCENT: Color32 = Color32::from_rgb(0x1f, 0x5f, 0xd0);
-/// Behind what is selected.
+/// Background of selected items.
 pub const ACCENT_WASH: Color32 = Color32::from_rgb(0xe3, 0xec, 0xfb);
-/// Done.
+/// Text about success.
 pub const GOOD: Color32 = Color32::from_rgb(0x15, 0x86, 0x43);
-/// Wrong.
+/// Text about errors.
 pub const BAD: Color32 = Color32::from_rgb(0xb9, 0x2d, 0x29);
 
-/// Sets fonts' sizes, spacing and colours once at the start.
+/// Applies the theme; to be called once at the start.
 pub fn apply(ctx: &egui::Context) {
     ctx.set_theme(egui::Theme::Light);
-    // Both styles: whoever asks for the dark one gets the same look.
+    // The dark style too, so that both look the same.
     ctx.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles = [

@@ -1,126 +1,26 @@
-//! The 3D view: events to intents, the picture through one paint callback, the chip beside the pointer.
+//! The 3D view: pointer events, the picture by a paint callback, the counter of proposals beside the pointer.
 
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, ScreenDescriptor};
 use egui::{Align2, Color32, FontId, PaintCallbackInfo, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 use glam::Vec2;
-use plait_core::surface::SurfacePoint;
 
-use super::{PlaitApp, parts, theme};
-use crate::distortion::Colours;
-use crate::engine::{DisplaySurface, EmbeddingSummary, LayoutPart, Proposal};
+use super::hover::Hover;
+use super::prepared::SurfaceInput;
+use super::state::PlaitApp;
+use super::{element_picking, theme};
+use crate::distortion::ColourMode;
 use crate::input::{Button, Held, Intent, PointerEvent, Under};
-use crate::render::{Frame, Marker, Polyline, Renderer, SceneInput, SurfaceMesh, Toggles};
+use crate::render::{Frame, Renderer, SceneInput, Toggles};
 use crate::shading;
 use crate::worker::Job;
 
-/// After a placement or a choice among alternatives the pointer may move so far, in points, before the strips under
-/// it are looked for anew: a trembling hand must not lose what was chosen.
-const CALM: f32 = 7.0;
+/// Distance from a placement or a choice of the wheel, in points, within which no new proposals are requested: a small
+/// movement of the hand must not lose the choice.
+const CALM_RADIUS: f32 = 7.0;
 
-/// What is shown under the pointer.
-#[derive(Debug, Default)]
-pub struct Hover {
-    /// The surface point under the pointer, found anew whenever the pointer or the view moved.
-    pub point: Option<SurfacePoint>,
-    /// The node or arc under the pointer, if it can be pinned.
-    pub part: Option<LayoutPart>,
-    /// The request that was sent last, while the user wants an answer.
-    generation: Option<u64>,
-    /// Strips through the point, best first.
-    pub proposals: Vec<Proposal>,
-    /// Which of them is shown.
-    pub chosen: usize,
-    /// Where the pointer was when something was placed or chosen.
-    calm_at: Option<Vec2>,
-    /// A click came before the answer: place the best when it arrives.
-    place_on_arrival: bool,
-    /// Where the last request was made.
-    asked_at: Option<Vec2>,
-}
-
-impl Hover {
-    /// The strip that a click would place.
-    pub fn shown(&self) -> Option<&Proposal> {
-        self.proposals.get(self.chosen)
-    }
-
-    /// Takes in an answer, final or early; returns what is to be placed at once.
-    pub fn arrived(&mut self, generation: u64, proposals: Vec<Proposal>, complete: bool) -> Option<Proposal> {
-        if self.generation != Some(generation) {
-            return None;
-        }
-        self.proposals = proposals;
-        self.chosen = 0;
-        if !complete {
-            return None;
-        }
-        self.generation = None;
-        let place = std::mem::take(&mut self.place_on_arrival);
-        self.proposals.first().filter(|_| place).cloned()
-    }
-
-    /// Shows nothing and wants nothing.
-    pub fn clear(&mut self) {
-        *self = Self { calm_at: self.calm_at, point: self.point, part: self.part, ..Self::default() };
-    }
-
-    /// Moves the choice among the alternatives, ending at the first and the last.
-    pub fn browse(&mut self, by: i32) {
-        let last = self.proposals.len().saturating_sub(1);
-        self.chosen = self.chosen.saturating_add_signed(by as isize).min(last);
-    }
-}
-
-/// What was last made for the renderer, to be made anew only when it changed.
-#[derive(Default)]
-pub struct Prepared {
-    surface: Option<(Drawn, Arc<SurfaceMesh>)>,
-    lines: Arc<Vec<Polyline>>,
-    markers: Arc<Vec<Marker>>,
-}
-
-/// What a surface was made of: its triangles, and what gives them their colours.
-struct Drawn {
-    display: Arc<DisplaySurface>,
-    colours: Colours,
-    summary: Option<Arc<EmbeddingSummary>>,
-}
-
-impl Drawn {
-    fn is(&self, other: &Self) -> bool {
-        let of = |d: &Self| d.summary.as_ref().map(Arc::as_ptr);
-        Arc::ptr_eq(&self.display, &other.display) && self.colours == other.colours && of(self) == of(other)
-    }
-}
-
-impl Prepared {
-    fn surface(&mut self, drawn: Drawn) -> Arc<SurfaceMesh> {
-        match &self.surface {
-            Some((held, mesh)) if held.is(&drawn) => Arc::clone(mesh),
-            _ => {
-                let tints = drawn.summary.as_ref().and_then(|s| drawn.colours.tints(s));
-                let mesh = Arc::new(shading::surface(&drawn.display, tints.as_deref()));
-                self.surface = Some((drawn, Arc::clone(&mesh)));
-                mesh
-            }
-        }
-    }
-
-    fn overlay(&mut self, overlay: Option<&shading::Overlay<'_>>) -> (Arc<Vec<Polyline>>, Arc<Vec<Marker>>) {
-        let (lines, markers) = overlay.map(shading::overlay).unwrap_or_default();
-        if *self.lines != lines {
-            self.lines = Arc::new(lines);
-        }
-        if *self.markers != markers {
-            self.markers = Arc::new(markers);
-        }
-        (Arc::clone(&self.lines), Arc::clone(&self.markers))
-    }
-}
-
-/// The view fills what is left of `ui`.
+/// Shows the view in the rest of `ui`.
 pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
     app.view_size = Vec2::new(rect.width(), rect.height());
@@ -132,7 +32,7 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
     for event in pointer_events(ui, rect, inside) {
         if let Some(at) = event_position(event) {
             app.hover.point = app.pick(at);
-            app.hover.part = parts::under(app, at);
+            app.hover.part = element_picking::pick(app, at);
         }
         let under = match (app.hover.part, app.hover.point) {
             (Some(_), _) => Under::Part,
@@ -148,14 +48,14 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
     } else if response.contains_pointer() && app.hover.part.is_some() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    } else if response.contains_pointer() && app.hover.point.is_some() && !app.is_bettering() {
+    } else if response.contains_pointer() && app.hover.point.is_some() && !app.is_optimising() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
     }
     paint(app, ui, rect);
-    chip(app, ui, rect);
+    proposal_counter(app, ui, rect);
 }
 
-/// The pointer's events in points from the corner of `rect`.
+/// The pointer events, in points from the corner of `rect`.
 fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
     let at = |p: Pos2| Vec2::new(p.x - rect.min.x, p.y - rect.min.y);
     let held = |m: &egui::Modifiers| Held { shift: m.shift, ctrl: m.command || m.ctrl };
@@ -179,7 +79,7 @@ fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
                     }
                 }
                 egui::Event::MouseWheel { unit, delta, modifiers, .. } if inside => {
-                    // With Shift some systems turn the wheel sideways.
+                    // Some systems scroll horizontally while Shift is held.
                     let amount = if delta.y == 0.0 { delta.x } else { delta.y };
                     list.push(match unit {
                         egui::MouseWheelUnit::Point => PointerEvent::Scroll(amount, held(modifiers)),
@@ -195,8 +95,8 @@ fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
     list
 }
 
-/// Virtual X servers (VNC, Xvfb) report the press and the release of a wheel's click as a notch each. Of two equal
-/// notches in a row within one frame the second goes; a real wheel turned that fast only loses some speed.
+/// Drops the second of two equal notches in one frame. Virtual X servers (VNC, Xvfb) report the press and the release
+/// of one wheel click as a notch each. A real wheel that is turned so fast only loses speed.
 fn drop_doubled_notches(events: &mut Vec<PointerEvent>) {
     let mut last = None;
     events.retain(|&event| {
@@ -237,12 +137,12 @@ fn carry_out(app: &mut PlaitApp, intent: Intent) {
 }
 
 fn hover(app: &mut PlaitApp, at: Vec2) {
-    if app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM) {
+    if app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM_RADIUS) {
         return;
     }
     app.hover.calm_at = None;
-    // Over an arc a click would not place; during an optimisation it would drop that.
-    if app.hover.part.is_some() || app.is_bettering() {
+    // Over a node or an arc a click pins it. During an optimisation a placement would cancel that.
+    if app.hover.part.is_some() || app.is_optimising() {
         app.hover.clear();
         app.worker.forget_hover();
         return;
@@ -261,7 +161,7 @@ fn hover(app: &mut PlaitApp, at: Vec2) {
     }
 }
 
-/// Pins what is under the pointer, or lets it go.
+/// Pins or unpins the node or arc under the pointer.
 fn pin(app: &mut PlaitApp) {
     let pinned = |part| app.layout().and_then(|l| l.is_pinned(part)).map(|pinned| (part, pinned));
     if let Some((part, pinned)) = app.hover.part.and_then(pinned) {
@@ -270,10 +170,10 @@ fn pin(app: &mut PlaitApp) {
 }
 
 fn place(app: &mut PlaitApp, at: Vec2) {
-    if app.is_bettering() {
+    if app.is_optimising() {
         return;
     }
-    let calm_here = app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM);
+    let calm_here = app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM_RADIUS);
     match app.hover.shown().cloned() {
         Some(proposal) if app.hover.generation.is_none() => {
             app.hover.clear();
@@ -281,7 +181,7 @@ fn place(app: &mut PlaitApp, at: Vec2) {
             app.hover.calm_at = Some(at);
         }
         _ if app.hover.generation.is_some() => app.hover.place_on_arrival = true,
-        // Something was placed here just now, so nothing is shown: ask for the next.
+        // After a placement at this position nothing is shown: request the next proposals.
         _ => {
             if calm_here {
                 app.hover.calm_at = None;
@@ -291,6 +191,7 @@ fn place(app: &mut PlaitApp, at: Vec2) {
     }
 }
 
+/// Draws one frame of the view within the pass of egui.
 struct ViewCallback {
     frame: Frame,
 }
@@ -328,8 +229,8 @@ fn paint(app: &mut PlaitApp, ui: &Ui, rect: Rect) {
     };
     let viewport = info.viewport_in_pixels();
     let size = [viewport.width_px.max(1) as u32, viewport.height_px.max(1) as u32];
-    // Colours that are read by a scale must not be mixed with a pattern.
-    let scale = app.colours() != Colours::Regions;
+    // Stripes would change the colours of the scale.
+    let scale = app.colour_mode() != ColourMode::Regions;
     let toggles = Toggles {
         stripes: app.options.stripes && !scale,
         wireframe: app.options.wireframe,
@@ -342,26 +243,26 @@ fn paint(app: &mut PlaitApp, ui: &Ui, rect: Rect) {
 
 fn scene_input(app: &mut PlaitApp) -> SceneInput {
     let Some(scene) = app.scene.clone() else { return SceneInput::default() };
-    let (colours, summary) = (app.colours(), app.summary().cloned());
-    let drawn = Drawn { display: Arc::clone(&scene.surface), colours, summary };
+    let (colour_mode, summary) = (app.colour_mode(), app.summary().cloned());
+    let input = SurfaceInput { display: Arc::clone(&scene.surface), colour_mode, summary };
     let mut prepared = std::mem::take(&mut app.prepared);
-    let surface = prepared.surface(drawn);
+    let surface = prepared.surface(input);
     let overlay = shading::Overlay {
         scene: &scene,
         proposal: app.hover.shown(),
         selected: app.selected,
         layout: app.layout().filter(|_| app.options.layout),
         part: app.hover.part,
-        strips: app.options.stripes && colours == Colours::Regions,
-        place: app.marked_place(),
+        strips: app.options.stripes && colour_mode == ColourMode::Regions,
+        place: app.messages.place(),
     };
-    let (lines, markers) = prepared.overlay(Some(&overlay));
+    let (lines, markers) = prepared.overlay(&overlay);
     app.prepared = prepared;
     SceneInput { surface, lines, markers }
 }
 
-/// "2 of 9" beside the pointer.
-fn chip(app: &PlaitApp, ui: &Ui, rect: Rect) {
+/// Shows "2 of 9" beside the pointer.
+fn proposal_counter(app: &PlaitApp, ui: &Ui, rect: Rect) {
     let Some(at) = app.input.position().filter(|_| !app.input.is_dragging()) else { return };
     let count = app.hover.proposals.len();
     if count < 2 || app.hover.shown().is_none() {
@@ -373,8 +274,8 @@ fn chip(app: &PlaitApp, ui: &Ui, rect: Rect) {
     let anchor = rect.min + vec2(at.x + 18.0, at.y + 16.0);
     let size = galley.size() + vec2(16.0, 8.0);
     let corner = anchor.min(rect.max - size - vec2(4.0, 4.0));
-    let chip = Rect::from_min_size(corner, size);
+    let label = Rect::from_min_size(corner, size);
     let green = Color32::from_rgb(shading::PROPOSED[0], shading::PROPOSED[1], shading::PROPOSED[2]);
-    painter.rect(chip, 9.0, green, Stroke::new(1.0, theme::RAISED), StrokeKind::Outside);
-    painter.galley(Align2::CENTER_CENTER.align_size_within_rect(galley.size(), chip).min, galley, Color32::WHITE);
+    painter.rect(label, 9.0, green, Stroke::new(1.0, theme::RAISED), StrokeKind::Outside);
+    painter.galley(Align2::CENTER_CENTER.align_size_within_rect(galley.size(), label).min, galley, Color32::WHITE);
 }

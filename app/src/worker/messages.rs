@@ -1,4 +1,4 @@
-//! What goes to the worker and what comes back.
+//! Jobs for the worker, and its replies.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::engine::{
     Detail, EmbeddingStep, EngineError, ExportOptions, ExportReport, LayoutPart, Proposal, Scene, Source, StripId,
 };
 
-/// Something to be done, in order.
+/// A job, to be done in order.
 #[derive(Debug, Clone)]
 pub enum Job {
     /// Open a model or a design in place of the present one.
@@ -24,28 +24,28 @@ pub enum Job {
     Remove(StripId),
     /// Show or hide a strip.
     SetVisible(StripId, bool),
-    /// Take back.
+    /// Undo the last change.
     Undo,
-    /// Make again.
+    /// Redo the change undone last.
     Redo,
-    /// Find the strip that helps most and place it.
+    /// Find a strip that resolves the most urgent problem, and place it.
     Suggest,
-    /// Try other strips.
+    /// Search for strips with a lower objective.
     Improve,
-    /// Weave with so much detail.
+    /// Change smoothing and curvature radius.
     SetDetail(Detail),
-    /// Pin a part of the layout, or let it go.
+    /// Pin or unpin a node or an arc of the layout.
     SetPinned(LayoutPart, bool),
     /// Optimise the embedding of the layout.
     Optimise,
-    /// Write the design.
+    /// Write the design to a file.
     Save(PathBuf),
-    /// Write the finished layout into a folder.
+    /// Write the layout to a folder.
     Export(PathBuf, ExportOptions),
 }
 
 impl Job {
-    /// What is being done, for the progress bar.
+    /// The name of the job, for the progress bar.
     pub fn label(&self) -> String {
         match self {
             Self::Open(source) => format!("Opening {}", source.name()),
@@ -54,9 +54,9 @@ impl Job {
             Self::SetVisible(..) => "Updating the view".into(),
             Self::Undo => "Undoing".into(),
             Self::Redo => "Redoing".into(),
-            Self::Suggest => "Looking for the strip that helps most".into(),
+            Self::Suggest => "Searching for a strip".into(),
             Self::Improve => "Improving the layout".into(),
-            Self::SetDetail(_) => "Setting the detail".into(),
+            Self::SetDetail(_) => "Recomputing curvature".into(),
             Self::SetPinned(..) => "Pinning".into(),
             Self::Optimise => "Optimising the embedding".into(),
             Self::Save(_) => "Saving the design".into(),
@@ -64,8 +64,8 @@ impl Job {
         }
     }
 
-    /// What it makes better step by step, if it does.
-    pub(super) fn betters(&self) -> Option<StoppableWork> {
+    /// The kind of stoppable work, if the job is one.
+    pub(super) fn stoppable_work(&self) -> Option<StoppableWork> {
         match self {
             Self::Improve => Some(StoppableWork::Strips),
             Self::Optimise => Some(StoppableWork::Embedding),
@@ -73,7 +73,7 @@ impl Job {
         }
     }
 
-    /// Whether it makes any work on the present layout useless.
+    /// Whether the job makes work on the present layout obsolete.
     pub(super) fn changes_strips(&self) -> bool {
         matches!(
             self,
@@ -89,99 +89,99 @@ impl Job {
     }
 }
 
-/// What comes back.
+/// A reply of the worker.
 #[derive(Debug)]
 pub enum Reply {
     /// A model was opened.
     Opened {
-        /// What was asked for.
+        /// What was opened.
         source: Source,
-        /// Its first snapshot.
+        /// Its first scene.
         scene: Arc<Scene>,
     },
     /// The design changed.
     Changed(Arc<Scene>),
-    /// The design is the same, the scene says more of it.
+    /// The design is the same; a part of its scene was added that takes long to compute.
     Completed(Arc<Scene>),
-    /// The strips for a hover request.
+    /// The proposals of a hover request.
     Proposals {
-        /// Which request.
+        /// The generation of the request.
         generation: u64,
-        /// Best first; of an answer that is not final, one that was found early.
+        /// The proposals, best first; while incomplete, one that was found early.
         proposals: Vec<Proposal>,
-        /// Whether this is all.
+        /// Whether these are all proposals.
         complete: bool,
     },
-    /// Other strips make a better layout.
-    Refitted {
-        /// The snapshot of them.
+    /// The search found strips with a lower objective.
+    StripsImproved {
+        /// The scene of the new strips.
         scene: Arc<Scene>,
-        /// How much better.
+        /// The objective before and after.
         improvement: Improvement,
-        /// Whether this is the end of it.
+        /// Whether the search has ended.
         complete: bool,
     },
-    /// The embedding became better; more may follow.
-    Improved(EmbeddingStep),
-    /// The embedding was optimised.
+    /// A step of the optimisation of the embedding.
+    EmbeddingStep(EmbeddingStep),
+    /// The optimisation of the embedding has ended.
     Optimised(Arc<Scene>),
     /// The design was written.
     Saved(PathBuf),
     /// The layout was written.
     Exported(PathBuf, ExportReport),
-    /// It could not be done.
+    /// A job failed.
     Failed {
-        /// What.
+        /// The name of the job.
         label: String,
-        /// Why; never [`EngineError::Cancelled`] for a hover request.
+        /// The reason; never [`EngineError::Cancelled`] for a hover request.
         error: EngineError,
     },
 }
 
-/// What is made better step by step.
+/// Work that can be stopped with its best result so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoppableWork {
-    /// The strips.
+    /// The search for better strips.
     Strips,
-    /// The embedding of their layout.
+    /// The optimisation of the embedding.
     Embedding,
 }
 
-/// Work that makes something better step by step and can be stopped.
+/// The stop flag of stoppable work.
 #[derive(Debug, Clone)]
-pub struct Steps {
-    /// What it makes better.
-    pub of: StoppableWork,
-    /// To be set in order to stop it and keep the best so far.
+pub struct StopFlag {
+    /// The work it stops.
+    pub work: StoppableWork,
+    /// Set to stop.
     pub stop: Arc<AtomicBool>,
 }
 
-impl Steps {
-    /// Whether it has been asked to stop.
+impl StopFlag {
+    /// Whether the work was asked to stop.
     pub fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 }
 
-/// What the worker is busy with.
+/// The running task.
 #[derive(Debug, Clone)]
 pub struct Running {
-    /// In words.
+    /// Its name.
     pub label: String,
-    /// Since when.
+    /// When it started.
     pub since: Instant,
-    /// How far; may be cancelled.
+    /// Its progress, by which it can be cancelled.
     pub progress: Arc<Progress>,
-    /// Whether anything else goes before it: a hover request, or what was left for later.
+    /// Whether any job precedes it: a hover request, or the completion of the scene.
     pub yields: bool,
-    /// Of what makes something better step by step.
-    pub steps: Option<Steps>,
+    /// The stop flag, if it can be stopped.
+    pub stoppable: Option<StopFlag>,
 }
 
 impl Running {
-    /// Whether the work goes on after a step.
+    /// Whether the work continues after a step.
     pub(super) fn flow(&self) -> ControlFlow<()> {
-        let stopped = self.steps.as_ref().is_some_and(Steps::is_stopped);
+        let stopped = self.stoppable.as_ref().is_some_and(StopFlag::is_stopped);
         if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }

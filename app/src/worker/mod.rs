@@ -1,48 +1,28 @@
 //! The worker: a thread that owns the engine, so that the window never waits.
 //!
-//! Requests that change something are queued and done in order. Of hover requests only the latest counts: a newer
-//! one, or any change, cancels the one being worked on. An optimisation of the embedding hands out what it has so far, may
-//! be stopped, and is dropped by any change of the strips. Opening cancels everything. Every reply wakes the window.
+//! Jobs that change the design are queued and done in order. Of hover requests only the latest counts: a newer one, or
+//! any job, cancels the one that runs. A search for better strips and an optimisation of the embedding send
+//! intermediate results and can be stopped; a job that changes the strips cancels them. Opening a model cancels
+//! everything. Every reply wakes the window.
 
 mod messages;
+mod shared;
 mod task;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use plait_core::surface::SurfacePoint;
 
-pub use messages::{Job, Reply, Running, Steps, StoppableWork};
-use task::Loop;
+pub use messages::{Job, Reply, Running, StopFlag, StoppableWork};
+use shared::Shared;
+use task::{Replies, WorkerLoop};
 
 use crate::engine::Opener;
-
-#[derive(Default)]
-struct State {
-    jobs: VecDeque<Job>,
-    hover: Option<(u64, SurfacePoint)>,
-    generation: u64,
-    /// Whether the engine may still have something to add to its scene.
-    incomplete: bool,
-    running: Option<Running>,
-    closed: bool,
-}
-
-struct Shared {
-    state: Mutex<State>,
-    wake: Condvar,
-}
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// The window's end of the worker.
 pub struct Worker {
@@ -51,27 +31,30 @@ pub struct Worker {
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
-/// How long the window may be held up by a worker that does not notice the end of the program.
-const PATIENCE_AT_EXIT: Duration = Duration::from_millis(300);
+/// Longest wait for the thread at the end of the program. A thread that does not stop by then ends with the process.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(300);
+/// Stack of the thread, in bytes: searches on large meshes recurse deeply.
+const STACK_SIZE: usize = 16 << 20;
 
 impl Worker {
-    /// Starts the thread. `notify` is called after every reply, from that thread.
+    /// Starts the thread. The thread calls `notify` after every reply.
     ///
     /// # Errors
     ///
-    /// When the system gives no thread.
+    /// When the system cannot start a thread.
     pub fn start(opener: Arc<dyn Opener>, notify: impl Fn() + Send + 'static) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared { state: Mutex::default(), wake: Condvar::new() });
+        let shared = Arc::new(Shared::new());
         let (sender, replies) = channel();
         let inner = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("engine".into())
-            .stack_size(16 << 20) // deep recursions of searches on large meshes
-            .spawn(move || Loop { shared: inner, opener, engine: None, sender, notify: Box::new(notify) }.run())?;
+        let run = move || {
+            let replies = Replies { sender, notify: Box::new(notify) };
+            WorkerLoop { shared: inner, opener, engine: None, replies }.run();
+        };
+        let thread = std::thread::Builder::new().name("engine".into()).stack_size(STACK_SIZE).spawn(run)?;
         Ok(Self { shared, replies, thread: Some(thread) })
     }
 
-    /// Queues a job. It goes before any hover request; [`Job::Open`] drops all that was asked before.
+    /// Queues a job. Jobs precede hover requests; [`Job::Open`] drops all earlier jobs.
     pub fn request(&self, job: Job) {
         let mut state = self.shared.lock();
         let open = matches!(job, Job::Open(_));
@@ -79,20 +62,21 @@ impl Worker {
         if open {
             state.jobs.clear();
         }
-        let useless = |r: &&Running| r.yields || open || (r.steps.is_some() && job.changes_strips());
-        if let Some(running) = state.running.as_ref().filter(useless) {
+        let obsolete = |r: &&Running| r.yields || open || (r.stoppable.is_some() && job.changes_strips());
+        if let Some(running) = state.running.as_ref().filter(obsolete) {
             running.progress.cancel();
         }
         state.jobs.push_back(job);
         self.shared.wake.notify_one();
     }
 
-    /// Asks for the strips through a point in place of any such request before; returns its generation.
+    /// Requests the proposals through a point, in place of any earlier such request. Returns the generation of the
+    /// request.
     pub fn hover(&self, at: SurfacePoint) -> u64 {
         let mut state = self.shared.lock();
         state.generation += 1;
         state.hover = Some((state.generation, at));
-        cancel_yielding(&state);
+        state.cancel_yielding();
         self.shared.wake.notify_one();
         state.generation
     }
@@ -101,10 +85,10 @@ impl Worker {
     pub fn forget_hover(&self) {
         let mut state = self.shared.lock();
         state.hover = None;
-        cancel_yielding(&state);
+        state.cancel_yielding();
     }
 
-    /// Cancels the job being done and all that wait.
+    /// Cancels the running job and drops all that wait.
     pub fn cancel(&self) {
         let mut state = self.shared.lock();
         state.jobs.clear();
@@ -114,19 +98,19 @@ impl Worker {
         }
     }
 
-    /// Stops what makes something better step by step: the best so far is finished and kept.
+    /// Stops the running search or optimisation. Its best result so far is kept.
     pub fn stop(&self) {
-        if let Some(steps) = self.shared.lock().running.as_ref().and_then(|r| r.steps.as_ref()) {
-            steps.stop.store(true, Ordering::Relaxed);
+        if let Some(stoppable) = self.shared.lock().running.as_ref().and_then(|r| r.stoppable.as_ref()) {
+            stoppable.stop.store(true, Ordering::Relaxed);
         }
     }
 
-    /// What is being done.
+    /// The task that runs now.
     pub fn running(&self) -> Option<Running> {
         self.shared.lock().running.clone()
     }
 
-    /// Whether nothing is being done or waits.
+    /// Whether no task runs or waits.
     pub fn is_idle(&self) -> bool {
         let state = self.shared.lock();
         state.running.is_none() && state.jobs.is_empty() && state.hover.is_none() && !state.incomplete
@@ -138,12 +122,6 @@ impl Worker {
     }
 }
 
-fn cancel_yielding(state: &State) {
-    if let Some(running) = state.running.as_ref().filter(|r| r.yields) {
-        running.progress.cancel();
-    }
-}
-
 impl Drop for Worker {
     fn drop(&mut self) {
         self.shared.lock().closed = true;
@@ -151,7 +129,7 @@ impl Drop for Worker {
         self.shared.wake.notify_one();
         let Some(thread) = self.thread.take() else { return };
         let start = Instant::now();
-        while !thread.is_finished() && start.elapsed() < PATIENCE_AT_EXIT {
+        while !thread.is_finished() && start.elapsed() < EXIT_TIMEOUT {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

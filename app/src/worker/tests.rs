@@ -15,8 +15,8 @@ use crate::engine::{
     Proposal, Scene, Source, StripId,
 };
 
-/// An engine whose answers carry the face they were asked for as their cost. Undo waits to be cancelled, redo
-/// panics, optimising goes on until it is stopped.
+/// An engine whose proposals have the number of the picked face as their cost. Undo runs until it is cancelled, redo
+/// panics, improving and optimising run until they are stopped.
 struct Fake(Arc<Scene>);
 
 struct FakeOpener;
@@ -78,7 +78,7 @@ impl Engine for Fake {
         Err(until_cancelled(progress))
     }
     fn redo(&mut self, _: &Progress) -> Result<(), EngineError> {
-        panic!("a bug, on purpose")
+        panic!("the panic of this test")
     }
     fn set_visible(&mut self, _: StripId, _: bool) -> Result<(), EngineError> {
         Ok(())
@@ -160,13 +160,13 @@ fn running(worker: &Worker, label: &str) {
 }
 
 #[test]
-fn the_latest_hover_supersedes_the_one_being_worked_on() {
+fn the_latest_hover_request_cancels_the_running_one() {
     let worker = worker();
     worker.hover(point(0));
-    running(&worker, "Looking for strips");
+    running(&worker, "Searching for strips");
     worker.hover(point(3));
     let latest = worker.hover(point(5));
-    // The first was cut short; of those that waited only the last may be answered last.
+    // The first was cancelled; the last reply is the one of the latest request.
     loop {
         let Reply::Proposals { generation, proposals, complete: true } = reply(&worker) else {
             panic!("not an answer")
@@ -179,17 +179,17 @@ fn the_latest_hover_supersedes_the_one_being_worked_on() {
 }
 
 #[test]
-fn changes_go_before_hovers_and_forget_them() {
+fn jobs_precede_and_drop_hover_requests() {
     let worker = worker();
     worker.hover(point(0));
-    running(&worker, "Looking for strips");
+    running(&worker, "Searching for strips");
     worker.request(Job::Save("x".into()));
     assert!(matches!(reply(&worker), Reply::Saved(_)));
     assert!(worker.reply().is_none());
 }
 
 #[test]
-fn long_work_is_cancelled_and_what_waited_is_dropped() {
+fn cancelling_drops_the_jobs_that_wait() {
     let worker = worker();
     worker.request(Job::Undo);
     running(&worker, "Undoing");
@@ -202,19 +202,19 @@ fn long_work_is_cancelled_and_what_waited_is_dropped() {
 }
 
 #[test]
-fn an_improvement_shows_its_scenes_and_stops_or_goes_back() {
+fn an_improvement_sends_scenes_and_is_stopped_or_cancelled() {
     let worker = worker();
     worker.request(Job::Improve);
     let mut shown = 0;
     while shown < 3 {
-        let Reply::Refitted { complete: false, improvement, .. } = reply(&worker) else { panic!("not a step") };
+        let Reply::StripsImproved { complete: false, improvement, .. } = reply(&worker) else { panic!("not a step") };
         shown = improvement.changes;
     }
     worker.stop();
     let done = loop {
         match reply(&worker) {
-            Reply::Refitted { complete: false, .. } => {}
-            Reply::Refitted { improvement, .. } => break improvement,
+            Reply::StripsImproved { complete: false, .. } => {}
+            Reply::StripsImproved { improvement, .. } => break improvement,
             other => panic!("{other:?}"),
         }
     };
@@ -223,11 +223,11 @@ fn an_improvement_shows_its_scenes_and_stops_or_goes_back() {
     worker.request(Job::Improve);
     running(&worker, "Improving the layout");
     worker.cancel();
-    // What was shown on the way is replaced by what there is.
+    // The scenes shown meanwhile are replaced by the present one.
     let mut back = false;
     loop {
         match reply(&worker) {
-            Reply::Refitted { .. } => {}
+            Reply::StripsImproved { .. } => {}
             Reply::Changed(_) => back = true,
             Reply::Failed { error: EngineError::Cancelled, .. } => break,
             other => panic!("{other:?}"),
@@ -241,7 +241,7 @@ fn after_steps(worker: &Worker) -> (usize, Reply) {
     let mut steps = 0;
     loop {
         match reply(worker) {
-            Reply::Improved(_) => steps += 1,
+            Reply::EmbeddingStep(_) => steps += 1,
             other => return (steps, other),
         }
     }
@@ -263,7 +263,7 @@ fn a_stopped_optimisation_is_kept_and_a_cancelled_one_is_not() {
 }
 
 #[test]
-fn changes_of_the_strips_drop_an_optimisation_and_others_wait_for_it() {
+fn jobs_that_change_strips_cancel_an_optimisation_and_others_wait() {
     let worker = worker();
     worker.request(Job::Optimise);
     running(&worker, "Optimising the embedding");
@@ -281,7 +281,7 @@ fn changes_of_the_strips_drop_an_optimisation_and_others_wait_for_it() {
 }
 
 #[test]
-fn a_bug_in_the_engine_costs_one_operation_only() {
+fn a_panic_of_the_engine_costs_one_operation_only() {
     let worker = worker();
     worker.request(Job::Redo);
     let Reply::Failed { error, .. } = reply(&worker) else { panic!("not a failure") };

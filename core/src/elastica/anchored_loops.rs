@@ -1,56 +1,61 @@
-//! Loops through several anchors, in order, each with or without a direction (Campen, chapter 8).
+//! Loops through several anchors in order, each with or without a direction (Campen, section 8.1.4).
 //!
-//! A search state gains the leg it is on: leg `i` leads from anchor `i` to the next, and ends with the first state
-//! that leaves the next anchor.
+//! A search state additionally has a leg. Leg `i` leads from anchor `i` to anchor `i + 1` and ends with the first state that
+//! leaves the latter.
 //!
-//! 1. *Legs*: the cheapest way over each leg alone, in any direction allowed at its ends, from both ends at once.
-//!    Their sum is a lower bound of the round.
-//! 2. *Rounds*: for a limit a bit above it, a field over all legs, backwards from the start anchor, holds the exact
-//!    cheapest way to finish the round, in any direction at the start. What the legs before cost at least keeps it
-//!    in the corridor of rounds below the limit.
-//! 3. With it as potential, an A* search per start direction closes the loop with that direction. If the best
-//!    loop is not below the limit, the limit grows.
+//! 1. *Legs*: a bidirectional search finds the least cost of each leg alone, in any allowed direction at its ends. The sum
+//!    is a lower bound of the round.
+//! 2. *Cost to go*: for a limit slightly above the bound, a search over all legs, backwards from the start anchor, finds the
+//!    exact least cost of the remaining round from each state, in any direction at the start. The bounds of the legs before
+//!    restrict it to states that can lie on a round below the limit.
+//! 3. With the cost to go as potential, an A* search per start direction closes the loop with that direction. If no loop
+//!    is below the limit, the limit is increased.
 //!
-//! The start is the anchor with the fewest directions. If all anchors have one, step 1 already knows the cost.
+//! The start is the anchor with the fewest directions. If all anchors have a direction, step 1 gives the exact cost.
+//!
+//! The source runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
 
 use glam::DVec3;
 
+use super::budget::{SearchBudget, Stop};
+use super::distance_field::DistanceField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
-use super::open_curves::{Exit, Exits};
+use super::open_curves::{BoundaryPath, BoundarySearch};
 use super::proposals::Proposals;
-use super::search::{Field, Meter, ROUNDING, Route, SearchWorkspace, Stop};
+use super::route::{ROUNDING, Route};
+use super::workspace::SearchWorkspace;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
-/// First limit, relative to the lower bound; the rest is for turns at anchors without direction.
+/// First limit as a multiple of the lower bound; the excess allows for turns at anchors without direction. Chosen by hand.
 const FIRST_LIMIT: f32 = 1.1;
 
-/// How much the limit grows when no loop was found below it.
-const GROWTH: f32 = 1.3;
+/// Factor by which the limit increases when no loop is below it. Chosen by hand.
+const LIMIT_GROWTH: f32 = 1.3;
 
-/// A place a loop has to pass, and the direction it has to pass it in, if any.
+/// A vertex that a loop has to pass, in a given direction if there is one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
-    /// The place.
+    /// The vertex.
     pub vertex: VertexId,
-    /// The direction; the geodesic nearest to it is taken.
+    /// The direction; the open geodesic nearest to it is used.
     pub direction: Option<DVec3>,
 }
 
-/// A loop wanted through anchors.
+/// A query for a loop through anchors.
 #[derive(Debug, Clone, Copy)]
 pub struct AnchorQuery<'a> {
     /// The anchors in the order in which the loop passes them.
     pub anchors: &'a [Anchor],
     /// Directions that are closed.
     pub mask: &'a DirectionMask,
-    /// Most search states to settle before the best so far is returned unproved.
+    /// Largest number of search states to settle; then the best loop found so far is returned without proof.
     pub budget: u64,
 }
 
 impl ElasticaGraph {
-    /// The cheapest loop through all anchors in order; on open surfaces it may instead be a curve from boundary to
+    /// The cheapest loop through all anchors in order. On open surfaces it may instead be a curve from boundary to
     /// boundary that passes them in order.
     ///
     /// # Errors
@@ -62,178 +67,190 @@ impl ElasticaGraph {
         work: &mut SearchWorkspace,
         progress: &Progress,
     ) -> Result<Proposals, Cancelled> {
-        let mut meter = Meter { progress, budget: query.budget, settled: 0 };
+        let mut budget = SearchBudget { progress, limit: query.budget, settled: 0 };
+        let (route, proved) = self.route_through(query, work, &mut budget)?;
+        let loops = route.and_then(|route| self.found_loop(&route)).into_iter().collect();
+        Ok(Proposals { loops, proved, settled: budget.settled })
+    }
+
+    /// The route of [`Self::loop_through`], from the first anchor on if it is closed, and whether it is proved to be the
+    /// cheapest.
+    pub(super) fn route_through(
+        &self,
+        query: &AnchorQuery,
+        work: &mut SearchWorkspace,
+        budget: &mut SearchBudget,
+    ) -> Result<(Option<Route>, bool), Cancelled> {
         let mut best = None;
-        let outcome = Round::new(self, query, work, &mut meter)
-            .and_then(|round| round.map_or(Ok(()), |mut r| r.solve(&mut meter, &mut best)));
+        let outcome = AnchoredSearch::new(self, query, work, budget)
+            .and_then(|search| search.map_or(Ok(()), |mut s| s.solve(budget, &mut best)));
         if outcome == Err(Stop::Cancelled) {
             return Err(Cancelled);
         }
         if let (Some(route), Some(first)) = (best.as_mut().filter(|r| r.closed), query.anchors.first()) {
-            // The search started at another anchor.
+            // The search may have started at another anchor.
             let start = route.states.iter().position(|&e| self.origin(e) == first.vertex);
             route.states.rotate_left(start.unwrap_or(0));
         }
-        let loops = best.and_then(|route| self.found(&route)).into_iter().collect();
-        Ok(Proposals { loops, proved: outcome.is_ok(), settled: meter.settled })
-    }
-
-    /// The open state leaving `v` that is nearest to a direction.
-    pub(super) fn nearest(&self, mask: &DirectionMask, v: VertexId, direction: DVec3) -> Option<State> {
-        let nearness = |a: &State| self.departure(*a).dot(direction);
-        let out = self.leaving(v).filter(|&a| mask.is_open(a));
-        out.max_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(b.cmp(a)))
+        Ok((best, outcome.is_ok()))
     }
 }
 
 /// One search for a loop through anchors, which are stored from the start anchor on.
-struct Round<'a> {
+struct AnchoredSearch<'a> {
     graph: &'a ElasticaGraph,
     mask: &'a DirectionMask,
-    /// States that may leave each anchor.
-    gates: Vec<Vec<State>>,
-    /// Per leg: its lower bound.
-    bounds: Vec<f32>,
-    /// Per leg: distances from its start, final up to a radius.
-    out: &'a mut [Field],
+    /// Per anchor: the states by which the loop may leave it (ξᵢ in the source), sorted.
+    departures: Vec<Vec<State>>,
+    /// Per leg: the least cost.
+    leg_costs: Vec<f32>,
+    /// Per leg: distances from its first anchor, final up to a radius.
+    leg_starts: &'a mut [DistanceField],
     radii: Vec<f32>,
-    /// Per leg: distances backwards over all legs to come, on reversed states.
-    home: &'a mut [Field],
+    /// Per leg: costs of the remaining round, stored at reversed states.
+    cost_to_go: &'a mut [DistanceField],
     /// Per leg: distances of the A* search.
-    ahead: &'a mut [Field],
-    /// Per state of the start gate: cheapest round from it.
-    rounds: Vec<f32>,
-    open: Option<Route>,
+    forward: &'a mut [DistanceField],
+    /// Per departure of the start anchor: least cost of a round, which may return in another direction.
+    round_costs: Vec<f32>,
+    /// The cheapest curve from boundary to boundary, if there is one.
+    open_curve: Option<Route>,
 }
 
-impl<'a> Round<'a> {
+impl<'a> AnchoredSearch<'a> {
+    /// `None` if some anchor cannot be left.
     fn new(
         graph: &'a ElasticaGraph,
         query: &AnchorQuery<'a>,
         work: &'a mut SearchWorkspace,
-        meter: &mut Meter,
+        budget: &mut SearchBudget,
     ) -> Result<Option<Self>, Stop> {
         let mask = query.mask;
-        let mut gates: Vec<Vec<State>> = query
+        let mut departures: Vec<Vec<State>> = query
             .anchors
             .iter()
             .map(|a| match a.direction {
-                Some(d) => graph.nearest(mask, a.vertex, d).into_iter().collect(),
-                None => graph.leaving(a.vertex).filter(|&e| mask.is_open(e)).collect(),
+                Some(d) => graph.nearest_open(mask, a.vertex, d).into_iter().collect(),
+                None => graph.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
             })
             .collect();
-        let start = (0..gates.len()).min_by_key(|&i| gates[i].len());
-        let Some(start) = start.filter(|&i| !gates[i].is_empty()) else { return Ok(None) };
-        let SearchWorkspace { out, home, ahead, exits, .. } = work;
-        let n = gates.len();
-        for legs in [&mut *out, &mut *home, &mut *ahead] {
-            legs.resize_with(n.max(legs.len()), Field::default);
+        let start = (0..departures.len()).min_by_key(|&i| departures[i].len());
+        let Some(start) = start.filter(|&i| !departures[i].is_empty()) else { return Ok(None) };
+        let SearchWorkspace { leg_starts, cost_to_go, forward, boundary, .. } = work;
+        let n = departures.len();
+        for legs in [&mut *leg_starts, &mut *cost_to_go, &mut *forward] {
+            legs.resize_with(n.max(legs.len()), DistanceField::default);
         }
-        let open = match Exits::new(graph, mask, exits, meter.progress)? {
-            Some(exits) => Passage { graph, mask, gates: &gates, exits }.cheapest(&mut ahead[..n], meter)?,
+        let open_curve = match BoundarySearch::new(graph, mask, boundary, budget.progress)? {
+            Some(boundary) => OpenCurveSearch { graph, mask, departures: &departures, boundary }
+                .cheapest(&mut forward[..n], budget)?,
             None => None,
         };
-        gates.rotate_left(start);
-        let rounds = vec![f32::INFINITY; gates[0].len()];
-        let (out, home, ahead) = (&mut out[..n], &mut home[..n], &mut ahead[..n]);
-        let (bounds, radii) = (vec![0.0; n], vec![0.0; n]);
-        Ok(Some(Self { graph, mask, gates, bounds, out, radii, home, ahead, rounds, open }))
+        departures.rotate_left(start);
+        let round_costs = vec![f32::INFINITY; departures[0].len()];
+        Ok(Some(Self {
+            graph,
+            mask,
+            departures,
+            leg_costs: vec![0.0; n],
+            leg_starts: &mut leg_starts[..n],
+            radii: vec![0.0; n],
+            cost_to_go: &mut cost_to_go[..n],
+            forward: &mut forward[..n],
+            round_costs,
+            open_curve,
+        }))
     }
 
-    fn solve(&mut self, meter: &mut Meter, best: &mut Option<Route>) -> Result<(), Stop> {
-        best.clone_from(&self.open);
-        for leg in 0..self.gates.len() {
-            self.bounds[leg] = self.cross(leg, meter)?;
+    fn solve(&mut self, budget: &mut SearchBudget, best: &mut Option<Route>) -> Result<(), Stop> {
+        best.clone_from(&self.open_curve);
+        for leg in 0..self.departures.len() {
+            self.leg_costs[leg] = self.search_leg(leg, budget)?;
         }
-        let least: f32 = self.bounds.iter().sum();
+        let least: f32 = self.leg_costs.iter().sum();
         if !least.is_finite() {
             return Ok(());
         }
         let cost = |best: &Option<Route>| best.as_ref().map_or(f32::INFINITY, |r| r.cost);
-        let directed = self.gates.iter().all(|g| g.len() == 1);
+        let directed = self.departures.iter().all(|d| d.len() == 1);
         let mut limit = least * if directed { ROUNDING } else { FIRST_LIMIT };
         while least < cost(best) {
             let below = limit.min(cost(best));
-            let complete = self.finish(below, least, meter)?;
-            let mut starts: Vec<usize> = (0..self.rounds.len()).collect();
-            starts.sort_by(|&i, &j| self.rounds[i].total_cmp(&self.rounds[j]).then(i.cmp(&j)));
+            let complete = self.compute_cost_to_go(below, least, budget)?;
+            let mut starts: Vec<usize> = (0..self.round_costs.len()).collect();
+            starts.sort_by(|&i, &j| self.round_costs[i].total_cmp(&self.round_costs[j]).then(i.cmp(&j)));
             for i in starts {
                 let below = limit.min(cost(best));
-                if self.rounds[i] >= below {
+                if self.round_costs[i] >= below {
                     break;
                 }
-                if let Some(route) = self.close(self.gates[0][i], below, meter)? {
+                if let Some(route) = self.loop_from(self.departures[0][i], below, budget)? {
                     *best = Some(route);
                 }
             }
             if complete || cost(best) <= limit {
                 break;
             }
-            limit *= GROWTH;
+            limit *= LIMIT_GROWTH;
         }
         Ok(())
     }
 
-    /// The cheapest way over a leg, by a search from both ends; its near half stays in `out`.
-    fn cross(&mut self, leg: usize, meter: &mut Meter) -> Result<f32, Stop> {
+    /// Step 1: the least cost of a leg. The forward front stays in `leg_starts`.
+    fn search_leg(&mut self, leg: usize, budget: &mut SearchBudget) -> Result<f32, Stop> {
         let graph = self.graph;
-        let (out, back) = (&mut self.out[leg], &mut self.ahead[leg]);
-        out.restart(graph.n_states());
-        back.restart(graph.n_states());
-        for &a in &self.gates[leg] {
-            out.set(a, 0.0, NO_STATE, 0);
-            out.push(0.0, a);
+        let (forward, backward) = (&mut self.leg_starts[leg], &mut self.forward[leg]);
+        forward.restart(graph.n_states());
+        backward.restart(graph.n_states());
+        for &a in &self.departures[leg] {
+            forward.add_source(a, 0.0);
         }
-        for &b in &self.gates[(leg + 1) % self.gates.len()] {
-            let source = graph.reverse[b as usize];
-            back.set(source, 0.0, NO_STATE, 0);
-            back.push(0.0, source);
+        for &b in &self.departures[(leg + 1) % self.departures.len()] {
+            backward.add_source(graph.reversed(b), 0.0);
         }
         let mut cost = f32::INFINITY;
-        while out.top() + back.top() < cost {
-            let outwards = out.top() <= back.top();
-            let (near, far) = if outwards { (&mut *out, &*back) } else { (&mut *back, &*out) };
-            expand(graph, self.mask, near, meter, |f, reached| {
-                cost = cost.min(reached + far.dist(graph.reverse[f as usize]));
+        while forward.min_key() + backward.min_key() < cost {
+            let forwards = forward.min_key() <= backward.min_key();
+            let (near, far) = if forwards { (&mut *forward, &*backward) } else { (&mut *backward, &*forward) };
+            settle_next(graph, self.mask, near, budget, |f, reached| {
+                cost = cost.min(reached + far.distance(graph.reversed(f)));
             })?;
         }
-        // Whatever is not settled is at least as far as the queue.
-        self.radii[leg] = out.top();
+        // The distances of states that are not settled are at least the smallest key.
+        self.radii[leg] = forward.min_key();
         Ok(cost)
     }
 
-    /// Finds for each start direction the cheapest round below `limit`, which may come back in another direction.
-    /// Returns whether the limit left nothing out.
-    fn finish(&mut self, limit: f32, least: f32, meter: &mut Meter) -> Result<bool, Stop> {
+    /// Step 2: the cost to go of the states on rounds below `limit`, and the least cost of a round per start direction.
+    /// Returns whether the limit excluded no state.
+    fn compute_cost_to_go(&mut self, limit: f32, least: f32, budget: &mut SearchBudget) -> Result<bool, Stop> {
         let graph = self.graph;
-        let last = self.gates.len() - 1;
+        let last = self.departures.len() - 1;
         for leg in 0..=last {
-            let radius = 0.5 * (limit - (least - self.bounds[leg]));
-            while self.out[leg].top() < radius {
-                expand(graph, self.mask, &mut self.out[leg], meter, |_, _| {})?;
+            let radius = 0.5 * (limit - (least - self.leg_costs[leg]));
+            while self.leg_starts[leg].min_key() < radius {
+                settle_next(graph, self.mask, &mut self.leg_starts[leg], budget, |_, _| {})?;
             }
-            self.radii[leg] = self.out[leg].top();
-            self.home[leg].restart(graph.n_states());
+            self.radii[leg] = self.leg_starts[leg].min_key();
+            self.cost_to_go[leg].restart(graph.n_states());
         }
-        self.rounds.fill(f32::INFINITY);
+        self.round_costs.fill(f32::INFINITY);
         let mut complete = true;
-        for &b in &self.gates[0] {
-            let source = graph.reverse[b as usize];
-            self.home[last].set(source, 0.0, NO_STATE, 0);
-            self.home[last].push(0.0, source);
+        for &b in &self.departures[0] {
+            self.cost_to_go[last].add_source(graph.reversed(b), 0.0);
         }
-        while let Some(leg) = earliest(self.home) {
-            let Some((d, y)) = self.home[leg].settle(graph) else { continue };
-            meter.tick()?;
+        while let Some(leg) = leg_of_min_key(self.cost_to_go) {
+            let Some((d, y)) = self.cost_to_go[leg].settle(graph) else { continue };
+            budget.count()?;
             for z in graph.successors(y).filter(|&z| self.mask.is_open(z)) {
-                let reached = d + graph.step(y, z);
-                complete &= self.reach(leg, z, reached, limit);
-                // `rev z` leaves the anchor this leg starts at: the leg before may end with it.
-                if let Some(i) = position(&self.gates[leg], graph.reverse[z as usize]) {
+                let reached = d + graph.step_cost(y, z);
+                complete &= self.relax_cost_to_go(leg, z, reached, limit);
+                // If `rev z` leaves the anchor at which this leg starts, the leg before may end with it.
+                if let Some(i) = index_in(&self.departures[leg], graph.reversed(z)) {
                     if leg == 0 {
-                        self.rounds[i] = self.rounds[i].min(reached);
+                        self.round_costs[i] = self.round_costs[i].min(reached);
                     } else {
-                        complete &= self.reach(leg - 1, z, reached, limit);
+                        complete &= self.relax_cost_to_go(leg - 1, z, reached, limit);
                     }
                 }
             }
@@ -241,99 +258,97 @@ impl<'a> Round<'a> {
         Ok(complete)
     }
 
-    /// Notes that the round can be finished from `rev z` on `leg` for `reached`; false if that is beyond the limit.
-    fn reach(&mut self, leg: usize, z: State, reached: f32, limit: f32) -> bool {
-        let e = self.graph.reverse[z as usize];
-        let before: f32 = self.bounds[..leg].iter().sum::<f32>() + self.out[leg].settled(e).min(self.radii[leg]);
+    /// Lowers the cost to go of `rev z` on `leg` to `reached`. Returns false if no round below the limit passes there.
+    fn relax_cost_to_go(&mut self, leg: usize, z: State, reached: f32, limit: f32) -> bool {
+        let e = self.graph.reversed(z);
+        let before: f32 =
+            self.leg_costs[..leg].iter().sum::<f32>() + self.leg_starts[leg].settled_distance(e).min(self.radii[leg]);
         if reached + before >= limit {
             return false;
         }
-        if self.home[leg].improves(z, reached) {
-            self.home[leg].set(z, reached, NO_STATE, 0);
-            self.home[leg].push(reached, z);
-        }
+        self.cost_to_go[leg].relax(z, reached, NO_STATE);
         true
     }
 
-    /// The cheapest loop that leaves the start anchor by `x` and comes back into it, if it costs less than `limit`.
-    fn close(&mut self, x: State, limit: f32, meter: &mut Meter) -> Result<Option<Route>, Stop> {
+    /// Step 3: the cheapest loop that leaves the start anchor by `x` and returns into it, if it costs less than `limit`.
+    ///
+    /// The tag of a label is the leg of its parent.
+    fn loop_from(&mut self, x: State, limit: f32, budget: &mut SearchBudget) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
-        let n = self.gates.len();
-        let ahead = &mut *self.ahead;
-        ahead.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
+        let n = self.departures.len();
+        let forward = &mut *self.forward;
+        forward.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
         let (mut cost, mut end) = (limit, None);
         let (mut leg, mut e, mut d, mut parent) = (0, x, 0.0, NO_STATE);
         loop {
             for f in graph.successors(e).filter(|&f| self.mask.is_open(f)) {
-                let reached = d + graph.step(e, f);
+                let reached = d + graph.step_cost(e, f);
                 if leg + 1 == n && f == x {
                     if reached < cost {
                         (cost, end) = (reached, Some((leg, e)));
                     }
                     continue;
                 }
-                // Once the next anchor can be left, it is never cheaper to stay on this leg.
-                let to = if leg + 1 < n && position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
-                let key = reached + self.home[to].settled(graph.reverse[f as usize]);
-                if key < cost && ahead[to].improves(f, reached) {
-                    ahead[to].set(f, reached, parent, leg as u16);
-                    ahead[to].push(key, f);
+                // Where the next anchor can be left, staying on this leg is never cheaper.
+                let to = if leg + 1 < n && index_in(&self.departures[leg + 1], f).is_some() { leg + 1 } else { leg };
+                let key = reached + self.cost_to_go[to].settled_distance(graph.reversed(f));
+                if key < cost && forward[to].improves(f, reached) {
+                    forward[to].set(f, reached, parent, leg as u16);
+                    forward[to].push(key, f);
                 }
             }
-            let Some(next) = earliest(ahead) else { break };
-            let Some((key, s)) = ahead[next].settle(graph) else { continue };
+            let Some(next) = leg_of_min_key(forward) else { break };
+            let Some((key, s)) = forward[next].settle(graph) else { continue };
             if key >= cost {
                 break;
             }
-            meter.tick()?;
-            (leg, e, d, parent) = (next, s, ahead[next].dist(s), s);
+            budget.count()?;
+            (leg, e, d, parent) = (next, s, forward[next].distance(s), s);
         }
         let Some((leg, last)) = end else { return Ok(None) };
         let mut states = vec![x];
-        states.extend(chain(ahead, leg, last));
+        states.extend(path_over_legs(forward, leg, last));
         Ok(Some(Route { cost, states, closed: true }))
     }
 }
 
-/// Settles the next state of a field and shows all its successors to `reach`.
-fn expand(
+/// Settles the next state of a field and relaxes its open successors; calls `reach` with each of them and its distance over
+/// this state.
+fn settle_next(
     graph: &ElasticaGraph,
     mask: &DirectionMask,
-    field: &mut Field,
-    meter: &mut Meter,
+    field: &mut DistanceField,
+    budget: &mut SearchBudget,
     mut reach: impl FnMut(State, f32),
 ) -> Result<(), Stop> {
     let Some((d, e)) = field.settle(graph) else { return Ok(()) };
-    meter.tick()?;
+    budget.count()?;
     graph.expand(e, |f, step| {
         let reached = d + step;
         if mask.is_open(f) {
             reach(f, reached);
-            if field.improves(f, reached) {
-                field.set(f, reached, e, 0);
-                field.push(reached, f);
-            }
+            field.relax(f, reached, e);
         }
     });
     Ok(())
 }
 
-/// The leg with the smallest key in its queue.
-fn earliest(legs: &mut [Field]) -> Option<usize> {
-    let tops = legs.iter_mut().map(Field::top).enumerate().filter(|(_, top)| top.is_finite());
-    tops.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+/// The leg with the smallest key in its queue; the first of equal ones.
+fn leg_of_min_key(legs: &mut [DistanceField]) -> Option<usize> {
+    let keys = legs.iter_mut().map(DistanceField::min_key).enumerate().filter(|(_, key)| key.is_finite());
+    keys.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
-/// Where a state is in a gate, which is sorted.
-fn position(gate: &[State], e: State) -> Option<usize> {
-    match (gate.first(), gate.last()) {
-        (Some(&first), Some(&last)) if (first..=last).contains(&e) => gate.binary_search(&e).ok(),
+/// Index of a state in a sorted list.
+fn index_in(sorted: &[State], e: State) -> Option<usize> {
+    match (sorted.first(), sorted.last()) {
+        (Some(&first), Some(&last)) if (first..=last).contains(&e) => sorted.binary_search(&e).ok(),
         _ => None,
     }
 }
 
-/// The states that lead to `e` on `leg`, over all legs; a label remembers the leg of its parent.
-fn chain(legs: &[Field], mut leg: usize, mut e: State) -> Vec<State> {
+/// The states from the first leg to `e` on `leg`. The tag of a label is the leg of its parent.
+fn path_over_legs(legs: &[DistanceField], mut leg: usize, mut e: State) -> Vec<State> {
     let mut states = Vec::new();
     while e != NO_STATE {
         states.push(e);
@@ -344,57 +359,58 @@ fn chain(legs: &[Field], mut leg: usize, mut e: State) -> Vec<State> {
     states
 }
 
-/// Open curves through anchors: from the boundary to the first, on to the last, and to the boundary.
-struct Passage<'a> {
+/// The search for an open curve through anchors: from the boundary to the first, to the others in order, and from the last
+/// to the boundary.
+struct OpenCurveSearch<'a> {
     graph: &'a ElasticaGraph,
     mask: &'a DirectionMask,
-    gates: &'a [Vec<State>],
-    exits: Exits<'a>,
+    departures: &'a [Vec<State>],
+    boundary: BoundarySearch<'a>,
 }
 
-impl Passage<'_> {
-    fn cheapest(&mut self, legs: &mut [Field], meter: &mut Meter) -> Result<Option<Route>, Stop> {
+impl OpenCurveSearch<'_> {
+    fn cheapest(&mut self, legs: &mut [DistanceField], budget: &mut SearchBudget) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
         let last = legs.len() - 1;
         legs.iter_mut().for_each(|leg| leg.restart(graph.n_states()));
-        let mut ins: Vec<Option<Exit>> = Vec::new();
-        for &b in &self.gates[0] {
-            let way = self.exits.way(graph.reverse[b as usize], f32::INFINITY, meter)?;
-            if let Some((cost, _)) = way {
-                legs[0].set(b, cost, NO_STATE, 0);
-                legs[0].push(cost, b);
+        let mut arrivals: Vec<Option<BoundaryPath>> = Vec::new();
+        for &b in &self.departures[0] {
+            let path = self.boundary.cheapest_path(graph.reversed(b), f32::INFINITY, budget)?;
+            if let Some((cost, _)) = path {
+                legs[0].add_source(b, cost);
             }
-            ins.push(way);
+            arrivals.push(path);
         }
         let (mut cost, mut end) = (f32::INFINITY, None);
-        while let Some(leg) = earliest(legs) {
+        while let Some(leg) = leg_of_min_key(legs) {
             let Some((d, e)) = legs[leg].settle(graph) else { continue };
             if d >= cost {
                 break;
             }
             if leg == last {
-                if let Some((more, out)) = self.exits.way(e, cost - d, meter)? {
-                    (cost, end) = (d + more, Some((e, out)));
+                if let Some((more, path)) = self.boundary.cheapest_path(e, cost - d, budget)? {
+                    (cost, end) = (d + more, Some((e, path)));
                 }
                 continue;
             }
-            meter.tick()?;
+            budget.count()?;
             graph.expand(e, |f, step| {
                 let reached = d + step;
-                let to = if position(&self.gates[leg + 1], f).is_some() { leg + 1 } else { leg };
+                let to = if index_in(&self.departures[leg + 1], f).is_some() { leg + 1 } else { leg };
                 if legs[to].improves(f, reached) && self.mask.is_open(f) {
                     legs[to].set(f, reached, e, leg as u16);
                     legs[to].push(reached, f);
                 }
             });
         }
-        let Some((a, out)) = end else { return Ok(None) };
-        let passed = chain(legs, last, a);
-        let first = passed.first().and_then(|&b| position(&self.gates[0], b));
-        let Some((_, back)) = first.and_then(|i| ins[i].take()) else { return Ok(None) };
-        let mut states: Vec<State> = back.iter().rev().map(|&s| graph.reverse[s as usize]).collect();
-        states.extend(&passed[1..]);
-        states.extend(&out[1..]);
+        let Some((a, departure)) = end else { return Ok(None) };
+        let between = path_over_legs(legs, last, a);
+        let first = between.first().and_then(|&b| index_in(&self.departures[0], b));
+        let Some((_, arrival)) = first.and_then(|i| arrivals[i].take()) else { return Ok(None) };
+        // The paths share the states by which the first and the last anchor are left.
+        let mut states: Vec<State> = arrival.iter().rev().map(|&s| graph.reversed(s)).collect();
+        states.extend(&between[1..]);
+        states.extend(&departure[1..]);
         Ok(Some(Route { cost, states, closed: false }))
     }
 }

@@ -1,51 +1,48 @@
-//! The cheapest loop in one start direction, without any bound: a search from both ends.
+//! The cheapest loop in one start direction, by a bidirectional search without any bound.
 //!
-//! The way back to a state is the way from its reverse, backwards, so both fronts run on the same graph.
+//! The reverse of a path into a state is a path out of its reverse, at the same cost, so both fronts run on the same graph.
 
-use super::graph::{ElasticaGraph, NO_STATE, State};
-use super::search::{Field, LoopSearch, Route, Stop};
+use std::convert::Infallible;
+
+use super::budget::Stop;
+use super::distance_field::DistanceField;
+use super::graph::{ElasticaGraph, State};
+use super::route::Route;
+use super::search::LoopSearch;
 use crate::mesh::VertexId;
 
 impl ElasticaGraph {
-    /// Cost of the state that is farthest from `v`, by plain Dijkstra over all states: the yardstick for searches.
+    /// Cost from `v` to the farthest state that it reaches, by plain Dijkstra over all states: a reference that benchmarks
+    /// compare searches with.
     pub fn eccentricity(&self, v: VertexId) -> f64 {
-        let mut field = Field::default();
+        let mut field = DistanceField::default();
         field.restart(self.n_states());
-        for a in self.leaving(v) {
-            field.set(a, 0.0, NO_STATE, 0);
-            field.push(0.0, a);
-        }
-        let mut eccentricity = 0.0;
-        while let Some((d, e)) = field.settle(self) {
-            eccentricity = d;
-            self.expand(e, |f, step| {
-                if field.improves(f, d + step) {
-                    field.set(f, d + step, e, 0);
-                    field.push(d + step, f);
-                }
-            });
-        }
-        f64::from(eccentricity)
+        self.outgoing(v).for_each(|a| field.add_source(a, 0.0));
+        let mut farthest = 0.0;
+        let Ok(()) = field.settle_all(self, |d| {
+            farthest = d;
+            Ok::<(), Infallible>(())
+        });
+        f64::from(farthest)
     }
 }
 
 impl LoopSearch<'_> {
-    /// The cheapest loop that starts with state `a`, if there is one cheaper than `limit`.
-    pub(super) fn both_ways(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
+    /// The cheapest loop that starts with state `a`, if it costs less than `limit`.
+    pub(super) fn bidirectional(&mut self, a: State, limit: f32) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
-        let (root, far) = (&mut self.work.root, &mut self.work.far);
-        let sources = [a, graph.reverse[a as usize]];
-        for (field, source) in [&mut *root, &mut *far].into_iter().zip(sources) {
+        let (forward, backward) = (&mut self.work.root, &mut self.work.backward);
+        let sources = [a, graph.reversed(a)];
+        for (field, source) in [&mut *forward, &mut *backward].into_iter().zip(sources) {
             field.restart(graph.n_states());
-            field.set(source, 0.0, NO_STATE, 0);
-            field.push(0.0, source);
+            field.add_source(source, 0.0);
         }
-        let (mut cost, mut meet) = (limit, None);
-        while root.top() + far.top() < cost {
-            let forwards = root.top() <= far.top();
-            let (near, other) = if forwards { (&mut *root, &*far) } else { (&mut *far, &*root) };
+        let (mut cost, mut meeting) = (limit, None);
+        while forward.min_key() + backward.min_key() < cost {
+            let forwards = forward.min_key() <= backward.min_key();
+            let (near, far) = if forwards { (&mut *forward, &*backward) } else { (&mut *backward, &*forward) };
             let Some((d, e)) = near.settle(graph) else { break };
-            self.meter.tick()?;
+            self.budget.count()?;
             graph.expand(e, |f, step| {
                 let reached = d + step;
                 if !near.improves(f, reached) || !self.mask.is_open(f) {
@@ -53,17 +50,17 @@ impl LoopSearch<'_> {
                 }
                 near.set(f, reached, e, 0);
                 near.push(reached, f);
-                let back = graph.reverse[f as usize];
-                let total = reached + other.dist(back);
+                let back = graph.reversed(f);
+                let total = reached + far.distance(back);
                 if total < cost {
-                    (cost, meet) = (total, Some(if forwards { (e, back) } else { (back, e) }));
+                    (cost, meeting) = (total, Some(if forwards { (e, back) } else { (back, e) }));
                 }
             });
         }
-        let Some((e, back)) = meet else { return Ok(None) };
-        let mut states = root.chain(e);
-        states.extend(far.chain(back).iter().rev().map(|&s| graph.reverse[s as usize]));
-        // Both chains hold the start.
+        let Some((e, back)) = meeting else { return Ok(None) };
+        let mut states = forward.path_to(e);
+        states.extend(backward.path_to(back).iter().rev().map(|&s| graph.reversed(s)));
+        // Both paths contain the start state.
         states.pop();
         Ok(Some(Route { cost, states, closed: true }))
     }

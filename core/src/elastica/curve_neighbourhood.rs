@@ -8,46 +8,47 @@ use crate::surface::SurfaceCurve;
 
 /// Memory for finding the vertices near curves, to be kept between them.
 #[derive(Debug, Default)]
-pub(super) struct Vicinity {
-    /// Per vertex the distance, infinite between uses.
-    dist: Vec<f64>,
+pub(super) struct CurveNeighbourhood {
+    /// Per vertex the distance; infinite between uses.
+    distance: Vec<f64>,
     queue: BinaryHeap<Reverse<(u64, VertexId)>>,
 }
 
-impl Vicinity {
-    /// The vertices within `radius` of the edges that `curve` crosses, measured along edges; sorted.
+impl CurveNeighbourhood {
+    /// The vertices within `radius` of the ends of the edges that `curve` crosses, measured along edges; sorted by index.
     pub(super) fn of(&mut self, mesh: &TriMesh, curve: &SurfaceCurve, radius: f64) -> Vec<VertexId> {
-        if self.dist.len() != mesh.n_vertices() {
-            self.dist = vec![f64::INFINITY; mesh.n_vertices()];
+        if self.distance.len() != mesh.n_vertices() {
+            self.distance = vec![f64::INFINITY; mesh.n_vertices()];
         }
-        let (dist, mut near) = (&mut self.dist, Vec::new());
+        let (distance, mut near) = (&mut self.distance, Vec::new());
         for v in curve.crossings.iter().flat_map(|c| [mesh.origin(c.halfedge), mesh.target(c.halfedge)]) {
-            if dist[v.index()] > 0.0 {
-                dist[v.index()] = 0.0;
+            if distance[v.index()] > 0.0 {
+                distance[v.index()] = 0.0;
                 near.push(v);
                 self.queue.push(Reverse((0, v)));
             }
         }
+        // Distances are not negative, so their bits order like them.
         while let Some(Reverse((key, v))) = self.queue.pop() {
             let d = f64::from_bits(key);
-            if d > dist[v.index()] {
+            if d > distance[v.index()] {
                 continue;
             }
             for h in mesh.outgoing(v) {
                 for (w, side) in [(mesh.target(h), h), (mesh.opposite(h), mesh.prev(h))] {
                     let reached = d + mesh.vector(side).length();
-                    if reached < dist[w.index()] && reached <= radius {
-                        if dist[w.index()] == f64::INFINITY {
+                    if reached < distance[w.index()] && reached <= radius {
+                        if distance[w.index()] == f64::INFINITY {
                             near.push(w);
                         }
-                        dist[w.index()] = reached;
+                        distance[w.index()] = reached;
                         self.queue.push(Reverse((reached.to_bits(), w)));
                     }
                 }
             }
         }
         for v in &near {
-            dist[v.index()] = f64::INFINITY;
+            distance[v.index()] = f64::INFINITY;
         }
         near.sort_unstable();
         near

@@ -1,50 +1,58 @@
-//! The geodesics of the graph: which vertices are joined, how long, in which directions and at what alignment cost.
+//! The geodesics of the graph `g`: between which vertices, their lengths, directions and alignment costs.
 //!
-//! Each vertex unfolds its rings and keeps the shortest straight geodesic to each larger vertex, so that a geodesic
-//! is computed once and is the same from both ends.
+//! Each vertex unfolds the triangles of its `k`-ring and keeps the shortest straight geodesic to each vertex of larger
+//! index. So each geodesic is computed once, and its numbers are the same from both ends.
 
 use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::alignment_cost::Weights;
-use super::unfold::{Corners, EdgeCrossing, Geodesic, Unfolding};
+use super::alignment_cost::AlignmentCost;
+use super::unfold::{Corners, EdgeCrossing, UnfoldedGeodesic, Unfolding};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 
-/// Most geodesics kept per vertex besides its own edges; the shortest ones. A regular 4-ring has about 60, a
-/// 5-ring 90, irregular ones up to twice that; the rest are hubs of slivers, where thousands would lie nearly
-/// in one place.
+/// Largest number of geodesics kept per vertex, besides its mesh edges; the shortest are kept. A regular 4-ring has about
+/// 60, a 5-ring 90, irregular ones up to twice as many. Vertices beyond the limit have many sliver triangles, where
+/// thousands of geodesics would nearly coincide.
 const MAX_GEODESICS: usize = 250;
 
-/// Largest ring looked at from one vertex, for the same reason.
+/// Largest number of vertices of a `k`-ring, for the same reason.
 const MAX_RING: usize = 1000;
 
-/// Shortest length a geodesic counts with, so that the turning cost stays finite.
+/// Lower bound of the length of a geodesic, so that the bending cost, which divides by it, stays finite. Chosen by hand;
+/// the surface has diagonal 1.
 const MIN_LENGTH: f64 = 1e-9;
 
-/// Vertices per parallel piece of work.
+/// Number of vertices that one parallel task handles; chosen by hand.
 const CHUNK: usize = 256;
 
-/// A geodesic between two vertices, before it has a place in the graph.
+/// A geodesic of `g`, without direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
+pub(super) struct Geodesic {
+    /// Its end vertices, the smaller index first.
     pub(super) ends: [u32; 2],
+    /// Tangent angles at which it leaves each end, in radians.
     pub(super) angles: [f32; 2],
+    /// Length, on a surface of diagonal 1.
     pub(super) length: f32,
+    /// Alignment cost per unit length.
     pub(super) alignment: f32,
-    pub(super) middle_face: u32,
-    pub(super) middle_angle: f32,
+    /// The face that holds its midpoint.
+    pub(super) midpoint_face: u32,
+    /// Angle of its direction at the midpoint from side 0 of that face, in radians.
+    pub(super) midpoint_angle: f32,
 }
 
-/// The rings around a vertex, with marks that are reused.
+/// The `k`-ring of a vertex; reusable.
 struct Rings {
+    /// Per vertex: the centre of the last ring it was in.
     mark: Vec<u32>,
     members: Vec<VertexId>,
 }
 
 impl Rings {
-    /// Marks the vertices within `rings` edges of `v`.
+    /// Finds the vertices within `rings` edges of `v`.
     fn gather(&mut self, mesh: &TriMesh, v: VertexId, rings: usize) {
         self.members.clear();
         self.members.push(v);
@@ -67,38 +75,43 @@ impl Rings {
     }
 }
 
-/// All geodesics of the graph, each once, from its smaller to its larger vertex.
+/// All geodesics of the graph, each once, from its end of smaller index to its end of larger index.
+///
+/// # Errors
+///
+/// When cancelled.
 pub(super) fn geodesics(
     mesh: &TriMesh,
     corners: &Corners,
-    weights: &Weights,
+    alignment: &AlignmentCost,
     rings: usize,
     progress: &Progress,
-) -> Result<Vec<Pair>, Cancelled> {
+) -> Result<Vec<Geodesic>, Cancelled> {
     let n = mesh.n_vertices();
     let memory = || (Rings { mark: vec![u32::MAX; n], members: Vec::new() }, Unfolding::default());
-    let chunks: Vec<(Vec<Pair>, Vec<f32>)> = (0..n.div_ceil(CHUNK))
+    let chunks: Vec<(Vec<Geodesic>, Vec<f32>)> = (0..n.div_ceil(CHUNK))
         .into_par_iter()
         .map_init(memory, |(ring, work), c| {
             progress.check()?;
-            let (mut pairs, mut limits) = (Vec::new(), Vec::new());
+            let (mut kept, mut limits) = (Vec::new(), Vec::new());
             for v in (c * CHUNK..((c + 1) * CHUNK).min(n)).map(VertexId::new) {
                 ring.gather(mesh, v, rings);
-                limits.push(from_vertex(mesh, corners, weights, v, ring, work, &mut pairs));
+                limits.push(from_vertex(mesh, corners, alignment, v, ring, work, &mut kept));
             }
-            Ok((pairs, limits))
+            Ok((kept, limits))
         })
         .collect::<Result<_, Cancelled>>()?;
     let limits: Vec<f32> = chunks.iter().flat_map(|c| &c.1).copied().collect();
-    let kept = |p: &Pair| p.ends.iter().all(|&v| p.length <= limits[v as usize]) || is_edge(mesh, p);
+    // A geodesic stays if both ends want it.
+    let kept = |g: &Geodesic| g.ends.iter().all(|&v| g.length <= limits[v as usize]) || is_edge(mesh, g);
     Ok(chunks.iter().flat_map(|c| &c.0).copied().filter(kept).collect())
 }
 
-fn is_edge(mesh: &TriMesh, p: &Pair) -> bool {
-    edge_between(mesh, VertexId(p.ends[0]), VertexId(p.ends[1])).is_some()
+fn is_edge(mesh: &TriMesh, g: &Geodesic) -> bool {
+    edge_between(mesh, VertexId(g.ends[0]), VertexId(g.ends[1])).is_some()
 }
 
-/// A half-edge along the edge between two vertices: from `v` to `w`, or back if only that exists.
+/// A half-edge of the edge between two vertices: from `v` to `w`, or from `w` to `v` on the boundary.
 pub(super) fn edge_between(mesh: &TriMesh, v: VertexId, w: VertexId) -> Option<HalfedgeId> {
     mesh.outgoing(v).find_map(|h| {
         let back = mesh.prev(h);
@@ -110,17 +123,17 @@ pub(super) fn edge_between(mesh: &TriMesh, v: VertexId, w: VertexId) -> Option<H
     })
 }
 
-/// Appends the geodesics from `v` to larger vertices; returns the length beyond which `v` wants none.
+/// Appends the geodesics from `v` to vertices of larger index. Returns the length above which `v` drops geodesics.
 fn from_vertex(
     mesh: &TriMesh,
     corners: &Corners,
-    weights: &Weights,
+    alignment: &AlignmentCost,
     v: VertexId,
     ring: &Rings,
     work: &mut Unfolding,
-    pairs: &mut Vec<Pair>,
+    kept: &mut Vec<Geodesic>,
 ) -> f32 {
-    let mut found: Vec<Geodesic> = Vec::new();
+    let mut found: Vec<UnfoldedGeodesic> = Vec::new();
     work.all(
         mesh,
         v,
@@ -131,9 +144,9 @@ fn from_vertex(
             }
         },
     );
-    // Mesh edges are visited first and stay; of the others the shortest to each vertex stays.
+    // To each vertex the mesh edge stays, or else the shortest geodesic.
     found.sort_by(|a, b| {
-        let key = |g: &Geodesic| (g.target, !g.is_edge());
+        let key = |g: &UnfoldedGeodesic| (g.target, !g.is_edge());
         key(a).cmp(&key(b)).then(a.length.total_cmp(&b.length))
     });
     found.dedup_by_key(|g| g.target);
@@ -145,26 +158,26 @@ fn from_vertex(
     };
     for g in found.iter().filter(|g| g.target > v) {
         let crossings = work.crossings(g);
-        let (middle_face, middle_angle) = middle(mesh, g, &crossings);
+        let (midpoint_face, midpoint_angle) = midpoint(mesh, g, &crossings);
         let angle = |h: HalfedgeId, local: f64| {
             let tangent = corners.tangent(mesh, h, local);
-            // An inner fan closes at 2π, where its first spoke is again.
+            // At an inner vertex the tangent angle 2π is the first half-edge again.
             if tangent >= TAU && !mesh.is_boundary_vertex(mesh.origin(h)) { tangent - TAU } else { tangent }
         };
-        pairs.push(Pair {
+        kept.push(Geodesic {
             ends: [v.0, g.target.0],
             angles: [angle(g.start, g.start_angle()) as f32, angle(g.end, g.end_angle()) as f32],
             length: g.length.max(MIN_LENGTH) as f32,
-            alignment: weights.of_geodesic(v, g, &crossings) as f32,
-            middle_face: middle_face.0,
-            middle_angle: middle_angle as f32,
+            alignment: alignment.of_geodesic(v, g, &crossings) as f32,
+            midpoint_face: midpoint_face.0,
+            midpoint_angle: midpoint_angle as f32,
         });
     }
     limit
 }
 
-/// The triangle that holds the middle of a geodesic, and the angle of its direction there from side 0.
-fn middle(mesh: &TriMesh, g: &Geodesic, crossings: &[EdgeCrossing]) -> (FaceId, f64) {
+/// The face that holds the midpoint of a geodesic, and the angle of its direction there from side 0.
+fn midpoint(mesh: &TriMesh, g: &UnfoldedGeodesic, crossings: &[EdgeCrossing]) -> (FaceId, f64) {
     let half = 0.5 * g.length;
     let (h, angle) = match crossings.iter().find(|c| c.distance >= half) {
         Some(c) => (c.halfedge, c.angle),
@@ -173,7 +186,7 @@ fn middle(mesh: &TriMesh, g: &Geodesic, crossings: &[EdgeCrossing]) -> (FaceId, 
     (mesh.face(h), side_angle(mesh, h) + angle)
 }
 
-/// Angle from side 0 of its triangle to a half-edge, counter-clockwise.
+/// Angle from side 0 of its face to a half-edge, counter-clockwise.
 fn side_angle(mesh: &TriMesh, h: HalfedgeId) -> f64 {
     let [first, second, _] = mesh.face_halfedges(mesh.face(h));
     match h.0 % 3 {

@@ -1,67 +1,71 @@
-//! Which closed curves are one another shifted over the surface.
+//! Homology classes of closed curves on a surface punctured at marks.
 //!
-//! Two curves are of one class if one is the other shifted without passing a mark: homologous on the surface punctured
-//! at its marks. A number for each edge, with a sign for the side it is crossed from, tells: where the numbers around
-//! each vertex that is no mark sum to zero, curves of one class have equal sums over the edges they cross. Numbers drawn
-//! at random among all of 64 bits with this property have different sums for different classes, but for odds of 2⁻⁶⁴.
-//! They are found with a tree of edges and a tree of triangles over the edges left (Eppstein, *Dynamic generators of
-//! topologically embedded graphs*): edges in neither are free, as many as there are handles, twice over; edges of the
-//! second have zero; those of the first follow from the leaves inwards.
+//! Each edge has a number, whose sign depends on the side from which the edge is crossed (a cocycle). Around each vertex
+//! that is not a mark the numbers sum to zero. Then homologous curves have equal sums over the edges they cross. The numbers
+//! are drawn at random from all 64-bit numbers with this property, so different classes have equal sums with probability
+//! 2⁻⁶⁴ only.
+//!
+//! The numbers are found with a spanning tree of the edges and a spanning tree of the triangles that crosses only edges
+//! outside the first (Eppstein, *Dynamic generators of topologically embedded graphs*). Edges in neither tree are free: two
+//! per handle. Edges crossed by the second tree have the number zero. The numbers in the first tree follow from the leaves
+//! to the root.
 
 use std::collections::VecDeque;
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::SurfaceCurve;
 
-/// The classes of closed curves on a mesh with marks.
+/// The homology classes of closed curves on a mesh punctured at marks and holes.
 #[derive(Debug)]
 pub struct HomologyClasses {
-    /// Per edge, for crossing it out of the triangle of its half-edge. Sums wrap.
-    weights: Vec<u64>,
+    /// Per edge, the number that a curve adds when it leaves the triangle of the edge's half-edge. Sums wrap.
+    cocycle: Vec<u64>,
 }
 
 impl HomologyClasses {
-    /// The classes on `mesh`, where no curve may be shifted past one of `marks` or a hole.
+    /// The classes on `mesh`, punctured at `marks` and at its holes.
     pub fn new(mesh: &TriMesh, marks: impl IntoIterator<Item = VertexId>) -> Self {
+        // Per vertex, the sum of the numbers around it.
         let mut charge = vec![0; mesh.n_vertices()];
         for v in marks {
             charge[v.index()] = random(u64::from(v.0));
         }
         let tree = vertex_tree(mesh, &charge);
-        let mut used: Vec<bool> = mesh.edges().map(|e| mesh.is_boundary_edge(e)).collect();
+        let mut in_tree: Vec<bool> = mesh.edges().map(|e| mesh.is_boundary_edge(e)).collect();
         for &(_, h) in &tree {
-            used[mesh.edge(h).index()] = true;
+            in_tree[mesh.edge(h).index()] = true;
         }
-        cross(mesh, &mut used);
-        let free = |(i, &used): (usize, &bool)| if used { 0 } else { random(!(i as u64)) };
-        let mut classes = Self { weights: used.iter().enumerate().map(free).collect() };
+        add_dual_tree(mesh, &mut in_tree);
+        let free = |(i, &in_tree): (usize, &bool)| if in_tree { 0 } else { random(!(i as u64)) };
+        let mut classes = Self { cocycle: in_tree.iter().enumerate().map(free).collect() };
         for &(v, h) in tree.iter().rev() {
-            // So far the edge to the parent is zero: it makes up for the others.
-            let others = mesh.outgoing(v).filter_map(|s| mesh.twin(s)).map(|s| classes.weight(mesh, s));
+            // The edge to the parent is still zero: it completes the sum of the others.
+            let others = mesh.outgoing(v).filter_map(|s| mesh.twin(s)).map(|s| classes.leaving(mesh, s));
             let missing = charge[v.index()].wrapping_sub(others.fold(0, u64::wrapping_add));
             let inwards = mesh.twin(h) == Some(mesh.halfedge(mesh.edge(h)));
-            classes.weights[mesh.edge(h).index()] = if inwards { missing } else { missing.wrapping_neg() };
+            classes.cocycle[mesh.edge(h).index()] = if inwards { missing } else { missing.wrapping_neg() };
         }
         classes
     }
 
-    /// What crossing a half-edge out of its triangle adds.
-    fn weight(&self, mesh: &TriMesh, h: HalfedgeId) -> u64 {
+    /// The number that a curve adds when it crosses a half-edge out of its triangle.
+    fn leaving(&self, mesh: &TriMesh, h: HalfedgeId) -> u64 {
         let e = mesh.edge(h);
-        let weight = self.weights[e.index()];
-        if mesh.halfedge(e) == h { weight } else { weight.wrapping_neg() }
+        let number = self.cocycle[e.index()];
+        if mesh.halfedge(e) == h { number } else { number.wrapping_neg() }
     }
 
-    /// The class of a curve, whichever way it runs. `None` if it is open, or bounds a piece of the surface without marks:
-    /// that can be a disc, or have handles.
+    /// The class of a curve, the same for both directions. `None` if the curve is open, or bounds a part of the surface
+    /// without marks and holes, which can be a disc or have handles.
     pub fn of(&self, mesh: &TriMesh, curve: &SurfaceCurve) -> Option<u64> {
-        let sum = curve.crossings.iter().fold(0u64, |sum, c| sum.wrapping_add(self.weight(mesh, c.halfedge)));
+        let sum = curve.crossings.iter().fold(0u64, |sum, c| sum.wrapping_add(self.leaving(mesh, c.halfedge)));
         (curve.closed && sum != 0).then(|| sum.min(sum.wrapping_neg()))
     }
 }
 
-/// A tree over the vertices of each component, with the half-edge from each vertex to its parent, parents first. Its root
-/// is what need not sum to zero: a hole with all vertices on it, or else a mark, if there is one.
+/// A spanning tree of the vertices of each component: each vertex with the half-edge to its parent, parents first. The sum
+/// around the root is not prescribed. So the root is all holes together, or else a mark; on a closed surface without marks
+/// it is any vertex, whose sum is then zero.
 fn vertex_tree(mesh: &TriMesh, charge: &[u64]) -> Vec<(VertexId, HalfedgeId)> {
     let (mut tree, mut seen) = (Vec::new(), vec![false; mesh.n_vertices()]);
     let holes = mesh.vertices().filter(|&v| mesh.is_boundary_vertex(v));
@@ -87,8 +91,8 @@ fn vertex_tree(mesh: &TriMesh, charge: &[u64]) -> Vec<(VertexId, HalfedgeId)> {
     tree
 }
 
-/// Marks the edges of a tree over the triangles of each component as used, which crosses none that is.
-fn cross(mesh: &TriMesh, used: &mut [bool]) {
+/// Marks the edges that a spanning tree of the triangles of each component crosses; it crosses no edge already marked.
+fn add_dual_tree(mesh: &TriMesh, in_tree: &mut [bool]) {
     let mut seen = vec![false; mesh.n_faces()];
     for first in mesh.faces() {
         let mut stack: Vec<FaceId> = if seen[first.index()] { Vec::new() } else { vec![first] };
@@ -96,8 +100,8 @@ fn cross(mesh: &TriMesh, used: &mut [bool]) {
         while let Some(f) = stack.pop() {
             for h in mesh.face_halfedges(f) {
                 let Some(g) = mesh.twin(h).map(|t| mesh.face(t)) else { continue };
-                if !used[mesh.edge(h).index()] && !seen[g.index()] {
-                    used[mesh.edge(h).index()] = true;
+                if !in_tree[mesh.edge(h).index()] && !seen[g.index()] {
+                    in_tree[mesh.edge(h).index()] = true;
                     seen[g.index()] = true;
                     stack.push(g);
                 }
@@ -106,7 +110,7 @@ fn cross(mesh: &TriMesh, used: &mut [bool]) {
     }
 }
 
-/// A random number that is always the same (SplitMix64).
+/// Random number of an index (SplitMix64).
 fn random(i: u64) -> u64 {
     let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -121,7 +125,7 @@ mod tests {
     use crate::surface::testing::{cylinder, ring, upright};
 
     #[test]
-    fn a_point_can_be_gone_round_if_it_is_no_mark() {
+    fn the_cocycle_sums_to_zero_around_vertices_that_are_not_marks() {
         for name in ["torus", "creature", "sleeve"] {
             let mesh = builtin(name).unwrap().mesh;
             let inside = |v: &VertexId| !mesh.is_boundary_vertex(*v);
@@ -129,14 +133,14 @@ mod tests {
             let classes = HomologyClasses::new(&mesh, marks.iter().copied());
             for v in mesh.vertices().filter(inside) {
                 let spokes = mesh.outgoing(v).filter_map(|h| mesh.twin(h));
-                let sum = spokes.map(|h| classes.weight(&mesh, h)).fold(0, u64::wrapping_add);
+                let sum = spokes.map(|h| classes.leaving(&mesh, h)).fold(0, u64::wrapping_add);
                 assert_eq!(sum != 0, marks.contains(&v), "{name} {v:?}");
             }
         }
     }
 
     #[test]
-    fn rings_of_a_cylinder_are_one_unless_a_mark_lies_between() {
+    fn rings_of_a_cylinder_are_homologous_unless_a_mark_separates_them() {
         let mesh = cylinder(24, 12, 0.0);
         let rings = [3, 5, 9].map(|row| ring(&mesh, 24, row, 0.0));
         let of = |classes: &HomologyClasses| rings.each_ref().map(|r| classes.of(&mesh, r).unwrap());

@@ -1,120 +1,124 @@
-//! A loop through one vertex, made of a loop nearby.
+//! A first loop through a vertex, made from a loop found nearby.
 //!
-//! A pointer that moves a little asks for almost the same loop again. The one found last, led through the new vertex by a
-//! short detour, is a loop of the graph like any other: it can be shown at once, and bounds the search from its first
-//! state on. Whether it is the cheapest is for the search to tell.
+//! When the pointer moves a little, almost the same loop is searched again. The last loop, with a short detour through the
+//! new vertex, is a valid loop of the graph. It can be shown at once, and its cost bounds the search from the start. The
+//! search decides whether it is the cheapest.
 
 use std::collections::HashMap;
 
 use super::graph::{ElasticaGraph, State};
 use super::mask::DirectionMask;
-use super::search::Route;
+use super::route::Route;
 use crate::mesh::VertexId;
 
-/// Most states of the loop nearby that a detour replaces on either side of the place next to the vertex: about as many as
-/// a strip is wide.
+/// Largest number of states of the loop that the detour replaces on either side of the vertex nearest to the new one: about
+/// the width of a strip.
 const DETOUR: usize = 8;
 
-/// A way between the vertex and the loop nearby.
-struct Way {
-    /// The states, away from the vertex.
+/// A path from the vertex to the loop, of one or two states.
+struct Link {
     states: [Option<State>; 2],
-    /// How many vertices away from the place next to the vertex it meets the loop.
-    at: usize,
-    /// Its price less that of the part of the loop that it replaces.
-    price: f64,
+    /// Number of states from the start of the loop to the vertex where the path joins it.
+    joins_at: usize,
+    /// Cost of the path, minus that of the part of the loop that it replaces.
+    extra_cost: f64,
 }
 
-/// A closed loop as seen from a place on it in one direction.
-struct Loop<'a> {
+/// A closed loop, from a start vertex on, in one of its directions.
+struct DirectedLoop<'a> {
     graph: &'a ElasticaGraph,
     mask: &'a DirectionMask,
-    /// The states, that first which leaves the place.
+    /// The states, from the one that leaves the start.
     states: Vec<State>,
-    /// The price of the step into each from the one before.
-    into: Vec<f64>,
-    /// For the vertices that can be met how far they are.
-    ahead: HashMap<u32, usize>,
+    /// Per state: cost of the step into it from the one before.
+    step_costs: Vec<f64>,
+    /// The vertices at which a link may join: number of states from the start to them.
+    joints: HashMap<u32, usize>,
 }
 
-impl<'a> Loop<'a> {
-    /// `None` if the states are no loop of the graph or one is closed.
+impl<'a> DirectedLoop<'a> {
+    /// `None` if the states are not a loop of the graph or one of them is closed.
     fn new(graph: &'a ElasticaGraph, mask: &'a DirectionMask, states: Vec<State>) -> Option<Self> {
         let n = states.len();
         let before = |k: usize| states[(k + n - 1) % n];
-        let into = (0..n).map(|k| price(graph, before(k), states[k])).collect::<Option<_>>()?;
+        let step_costs = (0..n).map(|k| step_cost(graph, before(k), states[k])).collect::<Option<_>>()?;
         let reach = DETOUR.min(n.saturating_sub(1) / 2);
-        let ahead = (0..=reach).rev().map(|k| (graph.origin(states[k]).0, k)).collect();
-        states.iter().all(|&e| mask.is_open(e)).then_some(Self { graph, mask, states, into, ahead })
+        let joints = (0..=reach).rev().map(|k| (graph.origin(states[k]).0, k)).collect();
+        states.iter().all(|&e| mask.is_open(e)).then_some(Self { graph, mask, states, step_costs, joints })
     }
 
-    /// The same run through the other way.
+    /// The same loop in the other direction, with the same start vertex.
     fn reversed(&self) -> Option<Self> {
-        // From the place back: first the reverse of the state that reaches it.
-        let states = self.states.iter().rev().map(|&e| self.graph.reverse[e as usize]).collect();
+        let states = self.states.iter().rev().map(|&e| self.graph.reversed(e)).collect();
         Self::new(self.graph, self.mask, states)
     }
 
-    /// The cheapest way on from each state that leaves `vertex`, of one state or two.
-    fn ways(&self, vertex: VertexId) -> HashMap<State, Way> {
+    /// For each state that leaves `vertex`, the cheapest link to the loop that begins with it.
+    fn links_from(&self, vertex: VertexId) -> HashMap<State, Link> {
         let graph = self.graph;
-        let meet = |e: State, spent: f64| {
-            let &at = self.ahead.get(&graph.target[e as usize])?;
-            let spared: f64 = self.into[1..=at].iter().sum();
-            Some((at, spent + price(graph, e, self.states[at])? - spared))
+        let join = |e: State, cost: f64| {
+            let &joins_at = self.joints.get(&graph.target(e).0)?;
+            let replaced: f64 = self.step_costs[1..=joins_at].iter().sum();
+            Some((joins_at, cost + step_cost(graph, e, self.states[joins_at])? - replaced))
         };
-        let mut ways = HashMap::new();
-        for a in graph.leaving(vertex).filter(|&a| self.mask.is_open(a)) {
-            let mut best = meet(a, 0.0).map(|(at, price)| Way { states: [Some(a), None], at, price });
+        let mut links = HashMap::new();
+        for a in graph.outgoing(vertex).filter(|&a| self.mask.is_open(a)) {
+            let mut best =
+                join(a, 0.0).map(|(joins_at, cost)| Link { states: [Some(a), None], joins_at, extra_cost: cost });
             for b in graph.successors(a).filter(|&b| self.mask.is_open(b)) {
-                let Some((at, price)) = meet(b, f64::from(graph.step(a, b))) else { continue };
-                if best.as_ref().is_none_or(|w| price < w.price) {
-                    best = Some(Way { states: [Some(a), Some(b)], at, price });
+                let Some((joins_at, cost)) = join(b, f64::from(graph.step_cost(a, b))) else { continue };
+                if best.as_ref().is_none_or(|link| cost < link.extra_cost) {
+                    best = Some(Link { states: [Some(a), Some(b)], joins_at, extra_cost: cost });
                 }
             }
-            ways.extend(best.map(|way| (a, way)));
+            links.extend(best.map(|link| (a, link)));
         }
-        ways
+        links
     }
 }
 
 impl ElasticaGraph {
-    /// The cheapest loop that passes `vertex` and else keeps to the closed loop through the vertices of `path`; `None` if
-    /// none is found, or none through open directions.
-    pub(super) fn seed(&self, mask: &DirectionMask, vertex: VertexId, path: &[VertexId]) -> Option<Route> {
+    /// The cheapest loop that passes `vertex` and elsewhere follows the closed loop through the vertices of `path`. `None`
+    /// if no detour of the allowed size joins them through open directions.
+    pub(super) fn initial_loop(&self, mask: &DirectionMask, vertex: VertexId, path: &[VertexId]) -> Option<Route> {
         let n = path.len();
         let here = self.mesh.position(vertex);
-        let far = |k: &usize| self.mesh.position(path[*k]).distance_squared(here);
-        let place = (0..n).min_by(|a, b| far(a).total_cmp(&far(b)))?;
+        let distance = |k: &usize| self.mesh.position(path[*k]).distance_squared(here);
+        let start = (0..n).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         let state = |k: usize| {
-            let (from, to) = (path[(place + k) % n], path[(place + k + 1) % n]);
-            self.leaving(from).find(|&e| self.target[e as usize] == to.0)
+            let (from, to) = (path[(start + k) % n], path[(start + k + 1) % n]);
+            self.outgoing(from).find(|&e| self.target(e) == to)
         };
-        let onward = Loop::new(self, mask, (0..n).map(state).collect::<Option<_>>()?)?;
-        let whole: f64 = onward.into.iter().sum();
-        if path[place] == vertex {
+        let onward = DirectedLoop::new(self, mask, (0..n).map(state).collect::<Option<_>>()?)?;
+        let whole: f64 = onward.step_costs.iter().sum();
+        if path[start] == vertex {
             return Some(Route { cost: whole as f32, states: onward.states, closed: true });
         }
         let back = onward.reversed()?;
-        let (on, home) = (onward.ways(vertex), back.ways(vertex));
-        // Left out besides is the step past the place itself.
-        let joined = |(&a, way): (&State, &Way), (&c, other): (&State, &Way)| {
-            let turn = price(self, self.reverse[c as usize], a)?;
-            (way.at + other.at < n).then_some((whole - onward.into[0] + way.price + turn + other.price, a, c))
+        let (onward_links, back_links) = (onward.links_from(vertex), back.links_from(vertex));
+        // The step past the start vertex itself is replaced too.
+        let joined = |(&a, on): (&State, &Link), (&c, off): (&State, &Link)| {
+            let turn = step_cost(self, self.reversed(c), a)?;
+            (on.joins_at + off.joins_at < n).then_some((
+                whole - onward.step_costs[0] + on.extra_cost + turn + off.extra_cost,
+                a,
+                c,
+            ))
         };
-        let all = on.iter().flat_map(|a| home.iter().map(move |c| (a, c)));
+        let pairs = onward_links.iter().flat_map(|a| back_links.iter().map(move |c| (a, c)));
+        // By the states where costs are equal, as the order of the maps varies.
         let cheaper =
             |x: &(f64, State, State), y: &(f64, State, State)| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2)));
-        let (cost, a, c) = all.filter_map(|(a, c)| joined(a, c)).min_by(cheaper)?;
-        let (way, other) = (&on[&a], &home[&c]);
-        let kept = onward.states[way.at..n - other.at].iter().copied();
-        let last = other.states.iter().rev().flatten().map(|&e| self.reverse[e as usize]);
-        let states = way.states.iter().flatten().copied().chain(kept).chain(last).collect();
+        let (cost, a, c) = pairs.filter_map(|(a, c)| joined(a, c)).min_by(cheaper)?;
+        let (on, off) = (&onward_links[&a], &back_links[&c]);
+        let kept = onward.states[on.joins_at..n - off.joins_at].iter().copied();
+        let last = off.states.iter().rev().flatten().map(|&e| self.reversed(e));
+        let states = on.states.iter().flatten().copied().chain(kept).chain(last).collect();
         Some(Route { cost: cost as f32, states, closed: true })
     }
 }
 
-/// The price of the step from one state into another, if that may follow.
-fn price(graph: &ElasticaGraph, e: State, f: State) -> Option<f64> {
-    graph.follows(e, f).then(|| f64::from(graph.step(e, f)))
+/// Cost of the step from one state into another; `None` if the other may not follow.
+fn step_cost(graph: &ElasticaGraph, e: State, f: State) -> Option<f64> {
+    graph.follows(e, f).then(|| f64::from(graph.step_cost(e, f)))
 }

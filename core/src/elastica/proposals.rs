@@ -1,67 +1,73 @@
-//! Loops proposed at a point: the cheapest, and alternatives in order of cost.
+//! Loops proposed at a vertex: the cheapest, and alternatives in order of cost.
 
 use glam::DVec3;
 
-use super::curve_neighbourhood::Vicinity;
+use super::budget::{SearchBudget, Stop};
+use super::curve_neighbourhood::CurveNeighbourhood;
 use super::graph::{ElasticaGraph, State};
 use super::homology::HomologyClasses;
 use super::mask::DirectionMask;
-use super::search::{Ball, LoopSearch, Meter, ROUNDING, Route, SearchWorkspace, Stop};
+use super::open_curves::BoundarySearch;
+use super::route::{ROUNDING, Route};
+use super::search::{Ball, LoopSearch};
+use super::workspace::SearchWorkspace;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::surface::SurfaceCurve;
 
-/// Two routes are one if one keeps within the separation of the other and their lengths differ by less than this
-/// factor: then neither leaves out what the other goes round.
+/// Largest ratio of the lengths of two loops that count as copies. A loop is a copy of a cheaper one if it stays within the
+/// separation of it and their lengths differ by less than this factor; then neither skips a part of the other. Chosen by
+/// hand.
 const SAME_LENGTH: f64 = 1.3;
 
-/// Cosine of 45°: loops of one class that pass the vertex in directions further apart are different strips, those nearer
-/// are one shifted to the side. Strips with less between them are equivalent (Campen, section 8.2.2).
-const OTHER_DIRECTION: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Cosine of 45°. Homologous loops that pass the vertex at a smaller angle to each other are equivalent, and the cheapest is
+/// kept; at a larger angle they are different strips (Campen, section 8.2.2).
+const SAME_DIRECTION: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Where the cheapest route shrinks to a point as a curve, the next ones up to this multiple of its cost are tried.
+/// Alternatives are searched up to this multiple of the cost of the cheapest route, if that route is contractible and so is
+/// no loop. Chosen by hand.
 const FALLBACK_FACTOR: f64 = 2.0;
 
-/// States settled from when there is a loop until it is shown, unless it is the cheapest before: about one
-/// millisecond, in which most loops found first give way to better ones.
-const PATIENCE: u64 = 4000;
+/// Number of states settled after the first loop is found and before it is shown: about one millisecond, in which most
+/// first loops are replaced by better ones.
+const SHOW_AFTER: u64 = 4000;
 
-/// What is known of a loop that is handed out early.
+/// What is known about a loop that is shown while the search continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// It is the cheapest so far; usually it is the cheapest of all, or costs a few percent more.
+    /// It is the cheapest found so far. Usually it is the cheapest of all, or costs a few percent more.
     Found,
     /// It is the cheapest of all.
     Proved,
 }
 
-/// What loops are wanted.
+/// A query for loops through a vertex.
 #[derive(Debug, Clone, Copy)]
 pub struct ProposalQuery<'a> {
-    /// The vertex they pass.
+    /// The vertex that the loops pass.
     pub vertex: VertexId,
-    /// The direction they pass it in: then only the cheapest loop along the geodesic nearest to this direction is
-    /// returned. Without, all directions compete.
+    /// The direction in which they pass it: only the cheapest loop along the geodesic nearest to this direction is
+    /// returned. `None`: all directions compete.
     pub direction: Option<DVec3>,
     /// Directions that are closed.
     pub mask: &'a DirectionMask,
-    /// Alternatives may cost up to this multiple of the cheapest loop; 1 asks for the cheapest only, which is faster.
+    /// Alternatives may cost up to this multiple of the cheapest loop. 1: only the cheapest, which is faster.
     pub factor: f64,
-    /// Most loops returned.
+    /// Largest number of loops returned.
     pub max: usize,
-    /// Alternatives keep this distance somewhere from every cheaper loop (in mesh units, measured along edges).
+    /// Each alternative is somewhere farther than this from every cheaper loop (in mesh units, measured along edges).
     pub separation: f64,
-    /// Of the loops of one class that pass the vertex in about the same direction only the cheapest is wanted.
+    /// If given, of homologous loops that pass the vertex in about the same direction only the cheapest is returned.
     pub classes: Option<&'a HomologyClasses>,
-    /// A loop found nearby under the same mask: the search starts from what it becomes where it passes the vertex.
+    /// A loop found at a vertex nearby, under the same mask: the search starts from its detour through the vertex.
     pub nearby: Option<&'a FoundLoop>,
-    /// Most search states to settle before the best so far is returned unproved. A state takes about a
-    /// quarter of a microsecond.
+    /// Largest number of search states to settle; then the best loop found so far is returned without proof. A state takes
+    /// about a quarter of a microsecond.
     pub budget: u64,
 }
 
 impl<'a> ProposalQuery<'a> {
-    /// The cheapest loop through a vertex, proved within about a second on ordinary meshes.
+    /// The cheapest loop through a vertex. The budget, about a second, suffices for a proof on ordinary meshes.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
         Self {
             vertex,
@@ -76,18 +82,18 @@ impl<'a> ProposalQuery<'a> {
         }
     }
 
-    /// The cheapest loop and up to 15 alternatives that cost at most half as much again.
+    /// The cheapest loop and up to 15 alternatives of at most 1.5 times its cost.
     pub fn alternatives(vertex: VertexId, mask: &'a DirectionMask) -> Self {
         Self { factor: 1.5, max: 16, budget: 20_000_000, ..Self::cheapest(vertex, mask) }
     }
 }
 
-/// A loop, or on open surfaces a curve from boundary to boundary, with its cost.
+/// A loop, or on open surfaces a curve from boundary to boundary, with its elastica cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundLoop {
     /// The curve on the mesh of the graph.
     pub curve: SurfaceCurve,
-    /// Total cost, the sum of the following three; a length for a surface of diagonal 1.
+    /// Elastica cost, the sum of the following three terms; a length, on a surface of diagonal 1.
     pub cost: f64,
     /// Length.
     pub length: f64,
@@ -95,7 +101,7 @@ pub struct FoundLoop {
     pub alignment: f64,
     /// Weighted squared geodesic curvature.
     pub bending: f64,
-    /// The vertices passed, joined by straight geodesics. A loop starts at the vertex asked for and does not repeat
+    /// The vertices passed, joined by straight geodesics. A loop starts at the vertex of the query and does not repeat
     /// it; an open curve starts and ends on the boundary.
     pub path: Vec<VertexId>,
 }
@@ -107,21 +113,22 @@ pub struct Proposals {
     pub loops: Vec<FoundLoop>,
     /// Whether the first is proved to be the cheapest and no alternative is missing; false if the budget was spent.
     pub proved: bool,
-    /// Search states settled.
+    /// Number of search states settled.
     pub settled: u64,
 }
 
-/// A loop that is proposed, and what others are compared with.
-struct Kept {
+/// A loop to be returned, with what the next ones are compared with.
+struct KeptLoop {
     found: FoundLoop,
     /// The vertices within the separation of it; sorted.
     near: Vec<VertexId>,
     class: Option<u64>,
+    /// Unit vector in which it passes the vertex.
     heading: DVec3,
 }
 
 impl ElasticaGraph {
-    /// The loops that `query` asks for. The result depends on nothing but the graph and the query.
+    /// The loops of a query. The result depends on nothing but the graph and the query.
     ///
     /// # Errors
     ///
@@ -135,9 +142,9 @@ impl ElasticaGraph {
         self.proposals_with(query, work, progress, |_, _| {})
     }
 
-    /// Like [`Self::proposals`], and hands loops to `watch` as soon as they are there: the first one found, perhaps
-    /// a better one, and the cheapest when it is proved to be that, before alternatives are looked for. The same loop
-    /// comes twice if what was found is then proved.
+    /// Like [`Self::proposals`], and calls `watch` with loops as soon as they are known: the first one found, each better
+    /// one, and the cheapest when it is proved, before alternatives are searched. A loop found and then proved is passed
+    /// twice.
     ///
     /// # Errors
     ///
@@ -154,160 +161,145 @@ impl ElasticaGraph {
             graph: self,
             mask: query.mask,
             work,
-            meter: Meter { progress, budget: query.budget, settled: 0 },
+            budget: SearchBudget { progress, limit: query.budget, settled: 0 },
             vertex: query.vertex,
             factor: query.factor.max(1.0) as f32,
         };
-        let seed = query.nearby.filter(|l| l.curve.closed && query.direction.is_none());
-        let seed = seed.and_then(|l| self.seed(query.mask, query.vertex, &l.path));
+        let nearby = query.nearby.filter(|l| l.curve.closed && query.direction.is_none());
+        let initial = nearby.and_then(|l| self.initial_loop(query.mask, query.vertex, &l.path));
         let mut routes = Vec::new();
         let outcome = match query.direction {
-            Some(direction) => search.along(direction, &mut routes),
-            None => search.all(seed, &mut routes, watch),
+            Some(direction) => search.in_direction(direction, &mut routes),
+            None => search.in_all_directions(initial, &mut routes, watch),
         };
         let proved = match outcome {
             Ok(()) => true,
             Err(Stop::Spent) => false,
             Err(Stop::Cancelled) => return Err(Cancelled),
         };
-        let settled = search.meter.settled;
+        let settled = search.budget.settled;
         let any = !routes.is_empty();
-        let loops = self.distinct(routes, query, &mut work.vicinity);
+        let loops = self.distinct(routes, query, &mut work.neighbourhood);
         if loops.is_empty() && any && query.direction.is_none() && query.factor < FALLBACK_FACTOR {
             return self.proposals(&ProposalQuery { factor: FALLBACK_FACTOR, ..*query }, work, progress);
         }
         Ok(Proposals { loops, proved, settled })
     }
 
-    /// The cheapest of `routes` that are curves and not copies of one another.
-    fn distinct(&self, mut routes: Vec<Route>, query: &ProposalQuery, vicinity: &mut Vicinity) -> Vec<FoundLoop> {
+    /// The cheapest of `routes` that are not contractible and not copies of one another.
+    fn distinct(
+        &self,
+        mut routes: Vec<Route>,
+        query: &ProposalQuery,
+        neighbourhood: &mut CurveNeighbourhood,
+    ) -> Vec<FoundLoop> {
         routes.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.states.cmp(&b.states)));
         let Some(limit) = routes.first().map(|r| r.cost * query.factor.max(1.0) as f32 * ROUNDING) else {
             return Vec::new();
         };
-        let mut kept: Vec<Kept> = Vec::new();
+        let mut kept: Vec<KeptLoop> = Vec::new();
         for route in routes.iter().take_while(|r| r.cost <= limit) {
             if kept.len() >= query.max {
                 break;
             }
-            if kept.iter().any(|k| self.keeps_to(route, k)) {
+            if kept.iter().any(|k| self.is_copy(route, k)) {
                 continue;
             }
-            let Some(found) = self.found(route) else { continue };
+            let Some(found) = self.found_loop(route) else { continue };
             let class = query.classes.and_then(|c| c.of(&self.mesh, &found.curve));
             let heading = self.heading(route);
-            let shifted = |k: &Kept| k.class == class && k.heading.dot(heading).abs() > OTHER_DIRECTION;
-            if class.is_some() && kept.iter().any(shifted) {
+            let equivalent = |k: &KeptLoop| k.class == class && k.heading.dot(heading).abs() > SAME_DIRECTION;
+            if class.is_some() && kept.iter().any(equivalent) {
                 continue;
             }
-            let near = vicinity.of(&self.mesh, &found.curve, query.separation);
-            kept.push(Kept { found, near, class, heading });
+            let near = neighbourhood.of(&self.mesh, &found.curve, query.separation);
+            kept.push(KeptLoop { found, near, class, heading });
         }
         kept.into_iter().map(|k| k.found).collect()
     }
 
-    /// Whether a route is a loop kept, but for details.
-    fn keeps_to(&self, route: &Route, kept: &Kept) -> bool {
-        let ratio = self.parts(route)[0] / kept.found.length;
+    /// Whether a route is a copy of a loop that is kept; see [`SAME_LENGTH`].
+    fn is_copy(&self, route: &Route, kept: &KeptLoop) -> bool {
+        let ratio = self.route_terms(route)[0] / kept.found.length;
         (1.0 / SAME_LENGTH..SAME_LENGTH).contains(&ratio)
             && kept.found.curve.closed == route.closed
             && route.states.iter().all(|&e| kept.near.binary_search(&self.origin(e)).is_ok())
     }
 
-    /// The direction in which a loop passes the vertex it starts at.
+    /// Unit vector in which a loop passes the vertex it starts at.
     fn heading(&self, route: &Route) -> DVec3 {
         let (Some(&first), Some(&last)) = (route.states.first(), route.states.last()) else { return DVec3::ZERO };
-        (self.departure(first) - self.departure(self.reverse[last as usize])).normalize_or_zero()
+        (self.departure(first) - self.departure(self.reversed(last))).normalize_or_zero()
     }
 
-    /// Length, alignment and bending of a route.
-    fn parts(&self, route: &Route) -> [f64; 3] {
-        let s = &route.states;
-        let mut sum = [0.0; 3];
-        let mut add = |parts: [f32; 3]| sum.iter_mut().zip(parts).for_each(|(s, p)| *s += f64::from(p));
-        for pair in s.windows(2) {
-            add(self.step_parts(pair[0], pair[1]));
-        }
-        if let (Some(&start), Some(&end)) = (s.first(), s.last()) {
-            if route.closed {
-                add(self.step_parts(end, start));
-            } else {
-                add(self.half_parts(start));
-                add(self.half_parts(end));
-            }
-        }
-        sum
-    }
-
-    pub(super) fn found(&self, route: &Route) -> Option<FoundLoop> {
+    /// The loop of a route; `None` if it is contractible to a point or cannot be traced.
+    pub(super) fn found_loop(&self, route: &Route) -> Option<FoundLoop> {
         let curve = self.curve(route)?;
-        let [length, alignment, bending] = self.parts(route);
-        let mut path: Vec<VertexId> = route.states.iter().map(|&e| self.origin(e)).collect();
-        if let Some(&last) = route.states.last().filter(|_| !route.closed) {
-            path.push(VertexId(self.target[last as usize]));
-        }
+        let [length, alignment, bending] = self.route_terms(route);
+        let path = self.route_vertices(route);
         Some(FoundLoop { curve, cost: length + alignment + bending, length, alignment, bending, path })
     }
 }
 
 impl LoopSearch<'_> {
-    /// The cheapest loop along the state nearest to `direction`.
-    fn along(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
-        let Some(a) = self.graph.nearest(self.mask, self.vertex, direction) else { return Ok(()) };
+    /// The cheapest loop or open curve along the state nearest to `direction`.
+    fn in_direction(&mut self, direction: DVec3, routes: &mut Vec<Route>) -> Result<(), Stop> {
+        let Some(a) = self.graph.nearest_open(self.mask, self.vertex, direction) else { return Ok(()) };
         let open = self.open_curves(&[a], f32::INFINITY, true)?;
         let limit = open.first().map_or(f32::INFINITY, |r| r.cost);
         routes.extend(open);
-        routes.extend(self.both_ways(a, limit)?);
+        routes.extend(self.bidirectional(a, limit)?);
         Ok(())
     }
 
-    /// The cheapest route, and those of the other start directions up to the factor. The search starts from `seed`, if
-    /// there is one.
-    pub(super) fn all(
+    /// The cheapest route, and the cheapest route of each other start direction up to the factor. The search starts from
+    /// the loop `initial`, if there is one.
+    pub(super) fn in_all_directions(
         &mut self,
-        seed: Option<Route>,
+        initial: Option<Route>,
         routes: &mut Vec<Route>,
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<(), Stop> {
-        let out: Vec<State> = self.graph.leaving(self.vertex).collect();
+        let out: Vec<State> = self.graph.outgoing(self.vertex).collect();
         routes.extend(self.open_curves(&out, f32::INFINITY, true)?);
-        let best = self.cheapest(seed, routes, &mut watch)?;
+        let best = self.cheapest(initial, routes, &mut watch)?;
         if self.factor > 1.0
             && let Some(cost) = best.as_ref().map(|r| r.cost)
         {
-            routes.extend(self.open_curves(&out, cost * self.slack(), false)?);
-            self.dearer(best, routes)?;
+            routes.extend(self.open_curves(&out, cost * self.limit_factor(), false)?);
+            self.more_expensive(best, routes)?;
         }
         Ok(())
     }
 
-    /// The cheapest route, proved; those that it improved on are among `routes`.
+    /// The cheapest route, proved. The routes that it improved on are among `routes`.
     fn cheapest(
         &mut self,
-        seed: Option<Route>,
+        initial: Option<Route>,
         routes: &mut Vec<Route>,
         mut watch: impl FnMut(Certainty, &FoundLoop),
     ) -> Result<Option<Route>, Stop> {
         let graph = self.graph;
         let mut show = |certainty, route: &Option<Route>| {
-            if let Some(l) = route.as_ref().and_then(|r| graph.found(r)) {
+            if let Some(l) = route.as_ref().and_then(|r| graph.found_loop(r)) {
                 watch(certainty, &l);
             }
         };
         let mut best = routes.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         self.start();
         let mut shown = None;
-        // It is shown at once, but proposed only if nothing is cheaper: an alternative it need not be.
-        let seed = seed.filter(|s| best.as_ref().is_none_or(|b| s.cost < b.cost));
-        if seed.is_some() {
-            best = seed;
+        // The initial loop is shown at once. It is proposed only if nothing is cheaper, as it need not be the cheapest of
+        // its start direction.
+        let initial = initial.filter(|s| best.as_ref().is_none_or(|b| s.cost < b.cost));
+        if initial.is_some() {
+            best = initial;
             shown = best.as_ref().map(|r| r.cost);
             show(Certainty::Found, &best);
         }
-        let seed = shown;
-        let mut patience = Some(PATIENCE);
+        let initial_cost = shown;
+        let mut pause = Some(SHOW_AFTER);
         loop {
-            let grown = self.ball(&mut best, 1.0, patience.take());
+            let grown = self.grow_ball(&mut best, 1.0, pause.take());
             let cost = best.as_ref().map(|r| r.cost);
             if cost != shown {
                 shown = cost;
@@ -319,13 +311,13 @@ impl LoopSearch<'_> {
             }
         }
         let mut cost = best.as_ref().map_or(f32::INFINITY, |r| r.cost);
-        self.corridor(cost)?;
-        let directions = self.directions(cost);
+        self.search_corridor(cost)?;
+        let directions = self.start_directions(cost);
         let known = routes.len();
         self.improve(&directions, &mut cost, routes)?;
         let better = routes[known..].iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         best = better.or(best);
-        if seed.is_some() && best.as_ref().map(|r| r.cost) == seed {
+        if initial_cost.is_some() && best.as_ref().map(|r| r.cost) == initial_cost {
             routes.extend(best.clone());
         }
         show(Certainty::Proved, &best);
@@ -333,18 +325,22 @@ impl LoopSearch<'_> {
     }
 
     /// The cheapest route of each start direction, up to the factor times the cost of `best`.
-    fn dearer(&mut self, mut best: Option<Route>, routes: &mut Vec<Route>) -> Result<(), Stop> {
+    fn more_expensive(&mut self, mut best: Option<Route>, routes: &mut Vec<Route>) -> Result<(), Stop> {
         let Some(cost) = best.as_ref().map(|r| r.cost) else { return Ok(()) };
-        let limit = cost * self.slack();
-        self.resume();
-        self.ball(&mut best, self.slack(), None)?;
-        self.corridor(limit)?;
-        let starts = self.directions(limit).into_iter().map(|d| d.1).collect();
+        let limit = cost * self.limit_factor();
+        self.resume_ball();
+        self.grow_ball(&mut best, self.limit_factor(), None)?;
+        self.search_corridor(limit)?;
+        let starts = self.start_directions(limit).into_iter().map(|d| d.1).collect();
         self.alternatives(starts, limit, routes)
     }
 
-    /// The factor, with room for rounding where costs up to it are wanted.
-    pub(super) fn slack(&self) -> f32 {
-        if self.factor > 1.0 { self.factor * ROUNDING } else { 1.0 }
+    /// The cheapest curves from boundary to boundary; see [`BoundarySearch::curves_through`]. None on a closed surface.
+    fn open_curves(&mut self, starts: &[State], limit: f32, only_better: bool) -> Result<Vec<Route>, Stop> {
+        let open = starts.iter().copied().filter(|&a| self.mask.is_open(a));
+        match BoundarySearch::new(self.graph, self.mask, &mut self.work.boundary, self.budget.progress)? {
+            Some(mut search) => search.curves_through(self.vertex, open, limit, only_better, &mut self.budget),
+            None => Ok(Vec::new()),
+        }
     }
 }

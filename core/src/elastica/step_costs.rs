@@ -1,163 +1,173 @@
-//! Steps between states: what may follow a state, and at which price.
+//! Steps between states, the edges of `g′`: which states may follow a state, and at what cost.
+//!
+//! The cost of a step is (8.2) of the source, for geodesics `e`, `f` that meet at the turning angle γ:
+//!
+//! `w(e, f) = |e′| (1 + α ½ (q(e) + q(f))) + β γ² / m`, with `m = min(|e|, |f|)` and
+//! `|e′| = γ m / (2 tan ½γ) + ½ ||e| − |f||`.
 
 use std::f32::consts::PI;
 
 use rayon::prelude::*;
 
-use super::graph::{ElasticaError, ElasticaGraph, Node, State};
-use crate::mesh::VertexId;
+use super::graph::{DirectedGeodesic, ElasticaGraph, State, Successors};
+use super::options::ElasticaError;
 
-/// How many places before the one computed the first allowed turn is looked for: rounding moves it by one at most.
-const NEARLY: usize = 2;
+/// Positions before the computed one at which the search for the first allowed turn begins. Rounding moves that position
+/// by one at most.
+const SEARCH_MARGIN: usize = 2;
 
-/// States whose steps are priced at once.
-const PART: usize = 4096;
-
-/// The states that may follow a state: a range around its end, which may be wrapped.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Window {
-    /// The first of them.
-    start: State,
-    /// Its position among the states of the vertex.
-    offset: u16,
-    count: u16,
-    /// How many of them are the first states of the vertex.
-    wrapped: u16,
-    /// Where the prices of the steps to them begin.
-    prices: u32,
-}
+/// Number of states whose step costs one parallel task computes; chosen by hand.
+const CHUNK: usize = 4096;
 
 impl ElasticaGraph {
-    /// Finds what follows each state, and the price of each step. The prices take as much memory as all else, but those
-    /// from one state lie in one place, and a search waits for memory more than for anything else.
+    /// Finds the successors of each state and the cost of each step.
+    ///
+    /// The costs take as much memory as everything else. They are stored because the costs of the steps from one state are
+    /// then contiguous, and a search is bound by memory latency.
     pub(super) fn find_steps(&mut self) -> Result<(), ElasticaError> {
         let graph = &*self;
-        self.window = (0..graph.n_states()).into_par_iter().map(|e| graph.find_window(e as State)).collect();
+        self.successors = (0..graph.n_states()).into_par_iter().map(|e| graph.find_successors(e as State)).collect();
         let mut count = 0u32;
-        for window in &mut self.window {
-            window.prices = count;
-            count = count.checked_add(u32::from(window.count)).ok_or(ElasticaError::TooLarge)?;
+        for range in &mut self.successors {
+            range.costs = count;
+            count = count.checked_add(u32::from(range.count)).ok_or(ElasticaError::TooLarge)?;
         }
-        self.prices = self.step_prices(count as usize);
+        self.step_costs = self.all_step_costs(count as usize);
         Ok(())
     }
 
-    /// The prices of all steps, of which there are so many, written where they stay: collected from parts they would take
-    /// twice the memory.
-    fn step_prices(&self, count: usize) -> Vec<f32> {
-        let mut prices = vec![0.0; count];
-        let mut parts = Vec::new();
-        let mut rest = &mut prices[..];
-        for first in (0..self.n_states()).step_by(PART) {
-            let states = first..(first + PART).min(self.n_states());
-            let steps = self.window[states.clone()].iter().map(|w| usize::from(w.count)).sum();
-            let (part, after) = rest.split_at_mut(steps);
-            parts.push((states, part));
+    /// The costs of all `count` steps. They are written in place: collecting them from chunks would take twice the memory.
+    fn all_step_costs(&self, count: usize) -> Vec<f32> {
+        let mut costs = vec![0.0; count];
+        let mut chunks = Vec::new();
+        let mut rest = &mut costs[..];
+        for first in (0..self.n_states()).step_by(CHUNK) {
+            let states = first..(first + CHUNK).min(self.n_states());
+            let steps = self.successors[states.clone()].iter().map(|range| usize::from(range.count)).sum();
+            let (chunk, after) = rest.split_at_mut(steps);
+            chunks.push((states, chunk));
             rest = after;
         }
-        parts.into_par_iter().for_each(|(states, part)| {
+        chunks.into_par_iter().for_each(|(states, chunk)| {
             let steps = states.flat_map(|e| self.successors(e as State).map(move |f| (e as State, f)));
-            part.iter_mut().zip(steps).for_each(|(price, (e, f))| *price = self.step(e, f));
+            chunk.iter_mut().zip(steps).for_each(|(cost, (e, f))| *cost = self.step_cost(e, f));
         });
-        prices
+        costs
     }
 
-    fn find_window(&self, e: State) -> Window {
-        let states = self.leaving(VertexId(self.target[e as usize]));
+    fn find_successors(&self, e: State) -> Successors {
+        let states = self.outgoing(self.target(e));
         let n = (states.end - states.start) as usize;
         let max_turn = self.options.max_turn as f32;
         let allowed = |i: usize| self.turn(e, states.start + (i % n) as u32) <= max_turn;
-        // They begin about where the largest turn leads to.
-        let lowest = (self.nodes[e as usize].back + PI - max_turn).rem_euclid(2.0 * PI);
-        let around = &self.nodes[states.start as usize..states.end as usize];
-        let about = around.partition_point(|node| node.out < lowest) + n.saturating_sub(NEARLY);
+        // The range begins near the angle that the largest turn to the right leads to.
+        let lowest = (self.geodesics[e as usize].back_angle + PI - max_turn).rem_euclid(2.0 * PI);
+        let around = &self.geodesics[states.start as usize..states.end as usize];
+        let about = around.partition_point(|g| g.out_angle < lowest) + n.saturating_sub(SEARCH_MARGIN);
         let begins = |&i: &usize| allowed(i) && !allowed(i + n - 1);
         let (offset, count) = match (about..about + n).find(begins) {
             Some(i) => (i % n, (1..n).find(|&k| !allowed(i + k)).unwrap_or(n)),
+            // Either every turn is allowed or none.
             None => (0, if n > 0 && allowed(0) { n } else { 0 }),
         };
         let wrapped = (offset + count).saturating_sub(n);
         let start = states.start + offset as u32;
-        Window { start, offset: offset as u16, count: count as u16, wrapped: wrapped as u16, prices: 0 }
+        Successors { start, offset: offset as u16, count: count as u16, wrapped: wrapped as u16, costs: 0 }
     }
 
-    /// Turning angle from `e` into `f`, which leaves the end of `e`. The same number from `rev f` into `rev e`.
+    /// Turning angle from `e` into `f`, which leaves the target of `e`; the same number from `rev f` into `rev e`.
     #[inline]
     fn turn(&self, e: State, f: State) -> f32 {
-        turn(&self.nodes[e as usize], &self.nodes[f as usize])
+        turn(&self.geodesics[e as usize], &self.geodesics[f as usize])
     }
 
     /// Number of steps between states.
     pub fn n_steps(&self) -> usize {
-        self.window.iter().map(|w| w.count as usize).sum()
+        self.successors.iter().map(|range| range.count as usize).sum()
     }
 
     /// The states that may follow `e`.
     #[inline]
     pub(super) fn successors(&self, e: State) -> impl Iterator<Item = State> + use<> {
-        let Window { start, offset, count, wrapped, .. } = self.window[e as usize];
+        let Successors { start, offset, count, wrapped, .. } = self.successors[e as usize];
         let first = start - u32::from(offset);
         (start..start + u32::from(count - wrapped)).chain(first..first + u32::from(wrapped))
     }
 
-    /// Shows every state that may follow `e`, and the price of that step, to `visit`.
+    /// Calls `visit` with each state that may follow `e` and the cost of the step into it.
     #[inline]
     pub(super) fn expand(&self, e: State, mut visit: impl FnMut(State, f32)) {
-        let window = &self.window[e as usize];
-        let first = window.start - u32::from(window.offset);
-        let prices = &self.prices[window.prices as usize..][..usize::from(window.count)];
-        let (straight, wrapped) = prices.split_at(usize::from(window.count - window.wrapped));
-        for (start, prices) in [(window.start, straight), (first, wrapped)] {
-            for (f, &step) in (start..).zip(prices) {
+        let range = &self.successors[e as usize];
+        let first = range.start - u32::from(range.offset);
+        let costs = &self.step_costs[range.costs as usize..][..usize::from(range.count)];
+        let (straight, wrapped) = costs.split_at(usize::from(range.count - range.wrapped));
+        for (start, costs) in [(range.start, straight), (first, wrapped)] {
+            for (f, &step) in (start..).zip(costs) {
                 visit(f, step);
             }
         }
     }
 
-    /// The first state that may follow `e`, and bits of prices at both ends of those that [`Self::expand`] reads.
+    /// The first state that may follow `e`, and bits of the first and the last step cost that [`Self::expand`] reads: for
+    /// prefetching.
     #[inline]
-    pub(super) fn ahead(&self, e: State) -> (State, u32) {
-        let window = &self.window[e as usize];
-        let prices = &self.prices[window.prices as usize..][..usize::from(window.count)];
-        match prices {
+    pub(super) fn touch_steps(&self, e: State) -> (State, u32) {
+        let range = &self.successors[e as usize];
+        let costs = &self.step_costs[range.costs as usize..][..usize::from(range.count)];
+        match costs {
             [] => (e, 0),
-            [first, ..] => (window.start, first.to_bits() ^ prices[prices.len() - 1].to_bits()),
+            [first, ..] => (range.start, first.to_bits() ^ costs[costs.len() - 1].to_bits()),
         }
     }
 
     /// Whether `f` may follow `e`.
     #[inline]
     pub(super) fn follows(&self, e: State, f: State) -> bool {
-        self.leaving(VertexId(self.target[e as usize])).contains(&f) && self.turn(e, f) <= self.options.max_turn as f32
+        self.outgoing(self.target(e)).contains(&f) && self.turn(e, f) <= self.options.max_turn as f32
     }
 
-    /// Parts of the price of the step from `e` into `f`: length, alignment and bending, weighted.
+    /// The weighted terms of the cost of the step from `e` into `f`: length, alignment and bending.
     #[inline]
-    pub(super) fn step_parts(&self, e: State, f: State) -> [f32; 3] {
+    pub(super) fn step_terms(&self, e: State, f: State) -> [f32; 3] {
         let (alpha, beta) = (self.options.alpha as f32, self.options.beta as f32);
-        price(&self.nodes[e as usize], &self.nodes[f as usize], alpha, beta)
+        step_terms(&self.geodesics[e as usize], &self.geodesics[f as usize], alpha, beta)
     }
 
-    /// Price of the step from `e` into `f`.
+    /// Cost of the step from `e` into `f`.
     #[inline]
-    pub(super) fn step(&self, e: State, f: State) -> f32 {
-        let [length, alignment, bending] = self.step_parts(e, f);
+    pub(super) fn step_cost(&self, e: State, f: State) -> f32 {
+        let [length, alignment, bending] = self.step_terms(e, f);
         length + alignment + bending
     }
+
+    /// The weighted terms of the cost of half a state, from its midpoint to its end, where an open curve ends on the
+    /// boundary: length, alignment and bending, which is zero.
+    #[inline]
+    pub(super) fn half_terms(&self, e: State) -> [f32; 3] {
+        let g = &self.geodesics[e as usize];
+        let length = 0.5 * g.length;
+        [length, self.options.alpha as f32 * g.alignment * length, 0.0]
+    }
+
+    /// Cost of half a state.
+    #[inline]
+    pub(super) fn half_cost(&self, e: State) -> f32 {
+        self.half_terms(e).iter().sum()
+    }
 }
 
 #[inline]
-fn turn(from: &Node, to: &Node) -> f32 {
-    ((to.out - from.back).abs() - PI).abs()
+fn turn(from: &DirectedGeodesic, to: &DirectedGeodesic) -> f32 {
+    ((to.out_angle - from.back_angle).abs() - PI).abs()
 }
 
-/// Parts of the price of a step: length, alignment and bending, weighted.
+/// The terms of (8.2), weighted: length, alignment and bending.
 #[inline]
-fn price(a: &Node, b: &Node, alpha: f32, beta: f32) -> [f32; 3] {
+fn step_terms(a: &DirectedGeodesic, b: &DirectedGeodesic, alpha: f32, beta: f32) -> [f32; 3] {
     let turn = turn(a, b);
-    // Not `min`, whose care for what is not a number costs.
+    // `f32::min` is slower, as it handles NaN.
     let least = if a.length < b.length { a.length } else { b.length };
-    // ½γ / tan ½γ by its series; the next term is below 1e-6 at 30°.
+    // Series of ½γ / tan ½γ; the next term is below 1e-6 at 30°.
     let x = 0.25 * turn * turn;
     let arc = 1.0 - x * (1.0 / 3.0 + x * (1.0 / 45.0 + x * (2.0 / 945.0)));
     let length = arc * least + 0.5 * (a.length - b.length).abs();

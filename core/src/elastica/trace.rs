@@ -1,81 +1,87 @@
 //! From a route in the graph to a curve on the mesh.
 //!
-//! A route passes through vertices, a curve must not: it is pushed off to its left, around each vertex through the
-//! fan between the way in and the way out. A geodesic along a mesh edge runs in the triangle left of it. Where the
-//! boundary is in the way, the right side is taken. Turning back at once over the edge just crossed is removed, so
-//! that what remains crosses each edge for a reason.
+//! A route passes through vertices; a curve must not. So the curve passes each vertex on its left, through the fan of
+//! triangles between the arriving and the leaving geodesic. A geodesic along a mesh edge runs in the triangle left of it.
+//! Where the boundary is in the way, the curve passes on the right. Crossings of an edge and straight back are removed, so
+//! that the curve crosses each edge because of its homotopy class.
 
 use super::geodesics::edge_between;
 use super::graph::{ElasticaGraph, State};
-use super::search::Route;
+use super::route::Route;
 use super::unfold::Unfolding;
-use crate::mesh::{HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
 
-/// How far from a vertex, relative to the edge, a curve passes it.
+/// Distance at which a curve passes a vertex, as a fraction of the edge crossed. Chosen by hand.
 const PASSING: f64 = 0.15;
 
-/// Least distance of a crossing from the ends of its edge, relative to the edge.
+/// Least distance of a crossing from the ends of its edge, as a fraction of the edge. Chosen by hand.
 const CLEARANCE: f64 = 0.05;
 
-/// Relative error allowed of the stored single-precision angle and length when a geodesic is traced again.
+/// Tolerance when a geodesic is traced again from its stored angle (radians) and length (relative): above the error of
+/// single precision.
 const TRACE_SLACK: f64 = 1e-4;
 
-/// One geodesic on the mesh: the corner it starts in, the edges it crosses, the corner it ends in.
-struct Segment {
+/// A geodesic on the mesh.
+struct TracedGeodesic {
+    /// The corner it starts in, as outgoing half-edge of its origin.
     start: HalfedgeId,
     crossings: Vec<Crossing>,
+    /// The corner it ends in, as outgoing half-edge of its target.
     end: HalfedgeId,
 }
 
 impl ElasticaGraph {
-    /// The curve of a route; `None` if it shrinks to nothing or a geodesic cannot be traced again.
+    /// The curve of a route; `None` if it is contractible to a point or a geodesic cannot be traced again.
     pub(super) fn curve(&self, route: &Route) -> Option<SurfaceCurve> {
         let mesh = &*self.mesh;
         let mut work = Unfolding::default();
-        let segments: Vec<Segment> = route.states.iter().map(|&e| self.segment(e, &mut work)).collect::<Option<_>>()?;
+        let traced: Vec<TracedGeodesic> =
+            route.states.iter().map(|&e| self.trace(e, &mut work)).collect::<Option<_>>()?;
         let mut crossings = Vec::new();
         if !route.closed {
-            crossings = towards_boundary(mesh, segments.first()?.start)?;
+            crossings = to_boundary(mesh, traced.first()?.start)?;
             reverse(mesh, &mut crossings);
         }
-        for (i, segment) in segments.iter().enumerate() {
-            crossings.extend(&segment.crossings);
-            match segments.get(i + 1).or(if route.closed { segments.first() } else { None }) {
-                Some(next) => crossings.extend(around(mesh, segment.end, next.start)?),
-                None => crossings.extend(towards_boundary(mesh, segment.end)?),
+        for (i, geodesic) in traced.iter().enumerate() {
+            crossings.extend(&geodesic.crossings);
+            match traced.get(i + 1).or(if route.closed { traced.first() } else { None }) {
+                Some(next) => crossings.extend(around_vertex(mesh, geodesic.end, next.start)?),
+                None => crossings.extend(to_boundary(mesh, geodesic.end)?),
             }
         }
-        let curve = SurfaceCurve { crossings: without_spurs(mesh, &crossings, route.closed), closed: route.closed };
+        let curve =
+            SurfaceCurve { crossings: without_backtracking(mesh, &crossings, route.closed), closed: route.closed };
         (curve.check(mesh).is_ok() && !(curve.closed && circles_one_vertex(mesh, &curve))).then_some(curve)
     }
 
-    fn segment(&self, e: State, work: &mut Unfolding) -> Option<Segment> {
+    /// Traces the geodesic of a state.
+    fn trace(&self, e: State, work: &mut Unfolding) -> Option<TracedGeodesic> {
         let mesh = &*self.mesh;
-        let (v, w) = (self.origin(e), VertexId(self.target[e as usize]));
+        let (v, w) = (self.origin(e), self.target(e));
         if let Some(h) = edge_between(mesh, v, w) {
             let (start, end) = if mesh.origin(h) == v { (h, mesh.next(h)) } else { (mesh.next(h), h) };
-            return Some(Segment { start, crossings: Vec::new(), end });
+            return Some(TracedGeodesic { start, crossings: Vec::new(), end });
         }
-        // Traced from the same end whichever way it is used, as it was found.
+        // Both directions are traced from the end of smaller index, from which the geodesic was found.
         if v > w {
-            let mut segment = self.segment(self.reverse[e as usize], work)?;
-            std::mem::swap(&mut segment.start, &mut segment.end);
-            reverse(mesh, &mut segment.crossings);
-            return Some(segment);
+            let mut geodesic = self.trace(self.reversed(e), work)?;
+            std::mem::swap(&mut geodesic.start, &mut geodesic.end);
+            reverse(mesh, &mut geodesic.crossings);
+            return Some(geodesic);
         }
-        let known = (self.out_angle(e), f64::from(self.nodes[e as usize].length));
+        let known = (self.out_angle(e), f64::from(self.geodesics[e as usize].length));
         let g = work.towards(mesh, &self.corners, v, w, known, TRACE_SLACK)?;
         let crossings = work
             .crossings(&g)
             .iter()
             .map(|c| Crossing { halfedge: c.halfedge, t: c.t.clamp(CLEARANCE, 1.0 - CLEARANCE) })
             .collect();
-        Some(Segment { start: g.start, crossings, end: g.end })
+        Some(TracedGeodesic { start: g.start, crossings, end: g.end })
     }
 }
 
-/// Turns a list of crossings round. The first of an open curve has no other side and keeps it.
+/// Reverses a list of crossings. A crossing of a boundary edge keeps its half-edge, which has no twin.
 fn reverse(mesh: &TriMesh, crossings: &mut [Crossing]) {
     crossings.reverse();
     for c in crossings {
@@ -96,8 +102,9 @@ fn counter_clockwise(mesh: &TriMesh, corner: HalfedgeId) -> (Crossing, Option<Ha
     (Crossing { halfedge: spoke, t: 1.0 - PASSING }, mesh.twin(spoke))
 }
 
-/// The crossings from one corner of a vertex to another, past the vertex on its left if there is surface.
-fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<Crossing>> {
+/// The crossings from one corner of a vertex to another: clockwise, that is past the vertex on its left, unless the boundary
+/// is in the way.
+fn around_vertex(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<Crossing>> {
     [clockwise, counter_clockwise].into_iter().find_map(|turn| {
         let mut list = Vec::new();
         let mut corner = from;
@@ -110,8 +117,8 @@ fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<Crossi
     })
 }
 
-/// The crossings from a corner of a boundary vertex over the boundary, the shorter way.
-fn towards_boundary(mesh: &TriMesh, from: HalfedgeId) -> Option<Vec<Crossing>> {
+/// The crossings from a corner of a boundary vertex to the boundary, in the direction with fewer of them.
+fn to_boundary(mesh: &TriMesh, from: HalfedgeId) -> Option<Vec<Crossing>> {
     [clockwise, counter_clockwise]
         .into_iter()
         .filter_map(|turn| {
@@ -130,25 +137,25 @@ fn towards_boundary(mesh: &TriMesh, from: HalfedgeId) -> Option<Vec<Crossing>> {
         .min_by_key(Vec::len)
 }
 
-/// Removes each crossing that is undone by the next.
-fn without_spurs(mesh: &TriMesh, crossings: &[Crossing], closed: bool) -> Vec<Crossing> {
-    let undone = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
+/// Removes pairs of consecutive crossings over an edge and straight back.
+fn without_backtracking(mesh: &TriMesh, crossings: &[Crossing], closed: bool) -> Vec<Crossing> {
+    let goes_back = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
     let mut kept: Vec<Crossing> = Vec::with_capacity(crossings.len());
     for c in crossings {
-        if kept.last().is_some_and(|last| undone(last, c)) {
+        if kept.last().is_some_and(|last| goes_back(last, c)) {
             kept.pop();
         } else {
             kept.push(*c);
         }
     }
     let mut ends = 0;
-    while closed && kept.len() >= 2 * ends + 2 && undone(&kept[kept.len() - 1 - ends], &kept[ends]) {
+    while closed && kept.len() >= 2 * ends + 2 && goes_back(&kept[kept.len() - 1 - ends], &kept[ends]) {
         ends += 1;
     }
     kept[ends..kept.len() - ends].to_vec()
 }
 
-/// Whether all edges crossed meet in one vertex, so that the curve is the boundary of a point.
+/// Whether all edges crossed have a vertex in common, so that the curve is contractible to it.
 fn circles_one_vertex(mesh: &TriMesh, curve: &SurfaceCurve) -> bool {
     let ends = |c: &Crossing| [mesh.origin(c.halfedge), mesh.target(c.halfedge)];
     let Some(first) = curve.crossings.first() else { return true };

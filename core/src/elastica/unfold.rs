@@ -1,8 +1,9 @@
 //! Straight geodesics from a vertex to the vertices around it.
 //!
-//! The triangles around a vertex are unfolded into the plane one across the other, each together with the window
-//! of directions in which it is seen; a vertex inside its window is the end of a straight geodesic. Vertices
-//! hidden behind a saddle have none and are left out.
+//! The triangles around the source vertex are unfolded into the plane, each across an edge of the one before. A window is
+//! an edge with the range of directions in which the source sees it. The vertex behind a window is the target of a
+//! straight geodesic if its direction lies inside that range. A vertex behind a saddle vertex may have no straight
+//! geodesic; it is left out.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -11,29 +12,32 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
-/// Parent of a window that starts at the source.
+/// Parent of a window on an edge opposite the source.
 const ROOT: u32 = u32::MAX;
 
-/// Most windows unfolded from one vertex. A regular 4-ring takes about 300, a 5-ring 450; only meshes with hubs of
-/// hundreds of slivers come near, and there the nearest windows, which come first, are enough.
+/// Largest number of windows unfolded from one vertex. A regular 4-ring has about 300, a 5-ring 450. Only vertices with
+/// hundreds of sliver triangles reach the limit; then the windows nearest to the source, which come first, are used.
 const MAX_WINDOWS: usize = 4000;
 
-/// Relative slack of the test whether a vertex lies inside its window: a geodesic may graze a vertex.
+/// Tolerance of the sine in the test whether a vertex lies inside its window: a geodesic may touch a vertex. Chosen by
+/// hand, above rounding.
 const GRAZING: f64 = 1e-10;
 
 /// The angles around each vertex.
+///
+/// The tangent angle of a direction at an inner vertex is its angle on the surface, scaled so that a full turn is 2π.
 #[derive(Debug)]
-pub(crate) struct Corners {
-    /// Per half-edge: the angle of its spoke at its origin, counter-clockwise from the first spoke of the fan.
+pub(super) struct Corners {
+    /// Per half-edge: its angle on the surface around its origin, counter-clockwise from the first outgoing half-edge.
     start: Vec<f64>,
-    /// Per vertex: full angle of its fan.
+    /// Per vertex: the sum of its corner angles.
     total: Vec<f64>,
-    /// Per vertex: what turns an angle on the surface into one of the tangent plane.
+    /// Per vertex: tangent angle per angle on the surface.
     scale: Vec<f64>,
 }
 
 impl Corners {
-    pub(crate) fn new(mesh: &TriMesh) -> Self {
+    pub(super) fn new(mesh: &TriMesh) -> Self {
         let mut start = vec![0.0; mesh.n_halfedges()];
         let mut total = vec![0.0; mesh.n_vertices()];
         let mut scale = vec![1.0; mesh.n_vertices()];
@@ -44,8 +48,8 @@ impl Corners {
                 sum += mesh.corner_angle(h);
             }
             total[v.index()] = sum;
-            // A full turn is 2π at every inner vertex; a boundary fan keeps its angle, so that a straight boundary
-            // is straight, unless it overlaps itself.
+            // At the boundary angles are not scaled, so that a straight boundary stays straight; unless their sum exceeds
+            // a full turn, where directions would coincide.
             if sum > 0.0 && (!mesh.is_boundary_vertex(v) || sum > std::f64::consts::TAU) {
                 scale[v.index()] = std::f64::consts::TAU / sum;
             }
@@ -53,18 +57,19 @@ impl Corners {
         Self { start, total, scale }
     }
 
-    /// The inverse of [`Self::tangent`].
-    pub(crate) fn local(&self, mesh: &TriMesh, h: HalfedgeId, tangent: f64) -> f64 {
+    /// The angle from `h` on the surface of the direction at a tangent angle: the inverse of [`Self::tangent`].
+    pub(super) fn local(&self, mesh: &TriMesh, h: HalfedgeId, tangent: f64) -> f64 {
         tangent / self.scale[mesh.origin(h).index()] - self.start[h.index()]
     }
 
-    /// Tangent angle of the direction `local` radians counter-clockwise of spoke `h`.
-    pub(crate) fn tangent(&self, mesh: &TriMesh, h: HalfedgeId, local: f64) -> f64 {
+    /// Tangent angle of the direction `local` radians counter-clockwise of `h`.
+    pub(super) fn tangent(&self, mesh: &TriMesh, h: HalfedgeId, local: f64) -> f64 {
         (self.start[h.index()] + local) * self.scale[mesh.origin(h).index()]
     }
 
-    /// The corner at `v` that holds a tangent angle, and the angle from its first spoke on the surface.
-    pub(crate) fn locate(&self, mesh: &TriMesh, v: VertexId, angle: f64) -> (HalfedgeId, f64) {
+    /// The corner at `v` that contains a tangent angle, as outgoing half-edge, and the angle from that half-edge on the
+    /// surface.
+    pub(super) fn locate(&self, mesh: &TriMesh, v: VertexId, angle: f64) -> (HalfedgeId, f64) {
         let raw = angle / self.scale[v.index()];
         let mut found = mesh.vertex_halfedge(v);
         for h in mesh.outgoing(v) {
@@ -77,7 +82,7 @@ impl Corners {
 }
 
 /// The unit vector in the triangle of `h` that points `local` radians counter-clockwise of `h`.
-pub(crate) fn direction_in_face(mesh: &TriMesh, h: HalfedgeId, local: f64) -> DVec3 {
+pub(super) fn direction_in_face(mesh: &TriMesh, h: HalfedgeId, local: f64) -> DVec3 {
     let x = mesh.vector(h).normalize_or_zero();
     let side = -mesh.vector(mesh.prev(h));
     let y = side.reject_from_normalized(x).normalize_or_zero();
@@ -86,83 +91,91 @@ pub(crate) fn direction_in_face(mesh: &TriMesh, h: HalfedgeId, local: f64) -> DV
 
 /// A straight geodesic from the source of an unfolding.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Geodesic {
-    pub(crate) target: VertexId,
-    pub(crate) length: f64,
+pub(super) struct UnfoldedGeodesic {
+    pub(super) target: VertexId,
+    pub(super) length: f64,
     /// The corner it starts in, as outgoing half-edge of the source.
-    pub(crate) start: HalfedgeId,
+    pub(super) start: HalfedgeId,
     /// The corner it ends in, as outgoing half-edge of the target.
-    pub(crate) end: HalfedgeId,
-    /// The end in the plane of the start corner.
+    pub(super) end: HalfedgeId,
+    /// Position of the target in the unfolded plane: the source is the origin, `start` the x axis.
     position: DVec2,
-    /// The direction of `end` in that plane.
+    /// The vector of `end` in that plane.
     side: DVec2,
+    /// The window behind which the target lies; [`ROOT`] for a mesh edge.
     window: u32,
 }
 
-impl Geodesic {
-    /// Angle from `start`.
-    pub(crate) fn start_angle(&self) -> f64 {
+impl UnfoldedGeodesic {
+    /// Angle from `start` to the geodesic, in radians.
+    pub(super) fn start_angle(&self) -> f64 {
         self.position.y.atan2(self.position.x).max(0.0)
     }
 
-    /// Angle from `end` to the direction back to the source.
-    pub(crate) fn end_angle(&self) -> f64 {
+    /// Angle from `end` to the direction back to the source, in radians.
+    pub(super) fn end_angle(&self) -> f64 {
         self.side.perp_dot(-self.position).atan2(self.side.dot(-self.position)).max(0.0)
     }
 
     /// Whether it is a mesh edge.
-    pub(crate) fn is_edge(&self) -> bool {
+    pub(super) fn is_edge(&self) -> bool {
         self.window == ROOT
     }
 }
 
-/// One mesh edge crossed by a geodesic.
+/// A mesh edge crossed by a geodesic.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct EdgeCrossing {
-    /// Seen from the triangle left.
-    pub(crate) halfedge: HalfedgeId,
-    /// From the origin (0) to the target (1) of the half-edge.
-    pub(crate) t: f64,
-    /// Distance from the source.
-    pub(crate) distance: f64,
-    /// Angle from the half-edge to the direction of travel, in (−π, 0).
-    pub(crate) angle: f64,
+pub(super) struct EdgeCrossing {
+    /// The half-edge in the triangle that the geodesic leaves.
+    pub(super) halfedge: HalfedgeId,
+    /// Position from the origin (0) to the target (1) of the half-edge.
+    pub(super) t: f64,
+    /// Distance from the source along the geodesic.
+    pub(super) distance: f64,
+    /// Angle from the half-edge to the direction of the geodesic, in (−π, 0).
+    pub(super) angle: f64,
 }
 
+/// An unfolded edge, with the directions in which the source sees it.
 #[derive(Debug, Clone, Copy)]
 struct Window {
-    /// Crossed half-edge, seen from the nearer triangle.
+    /// The half-edge in the triangle nearer to the source.
     halfedge: HalfedgeId,
+    /// The corner at the source that the directions lie in.
     start: HalfedgeId,
+    /// Position of the origin of `halfedge`.
     a: DVec2,
+    /// Position of the target of `halfedge`.
     b: DVec2,
+    /// The clockwise-most direction.
     low: DVec2,
+    /// The counter-clockwise-most direction.
     high: DVec2,
     parent: u32,
 }
 
-/// Reusable memory for unfolding.
+/// The windows of an unfolding; reusable.
 #[derive(Debug, Default)]
-pub(crate) struct Unfolding {
+pub(super) struct Unfolding {
     windows: Vec<Window>,
 }
 
 impl Unfolding {
-    /// Visits straight geodesics from `v` over the vertices for which `inside` holds, nearer triangles first.
-    /// A vertex can be met more than once; mesh edges come first.
-    pub(crate) fn all(
+    /// Calls `visit` with the straight geodesics from `v` to vertices for which `inside` holds, in breadth-first order of
+    /// the triangles unfolded; mesh edges come first. Only apexes for which `inside` holds are unfolded. A vertex can be
+    /// visited more than once.
+    pub(super) fn all(
         &mut self,
         mesh: &TriMesh,
         v: VertexId,
         inside: impl Fn(VertexId) -> bool,
-        mut visit: impl FnMut(Geodesic),
+        mut visit: impl FnMut(UnfoldedGeodesic),
     ) {
         self.windows.clear();
         for h in mesh.outgoing(v) {
-            visit(along_spoke(mesh, h));
+            visit(along_edge(mesh, h));
             if mesh.twin(mesh.prev(h)).is_none() {
-                visit(along_last_spoke(mesh, h));
+                visit(along_last_boundary_edge(mesh, h));
             }
             self.push_corner(mesh, h, None);
         }
@@ -172,8 +185,9 @@ impl Unfolding {
         });
     }
 
-    /// The geodesic from `v` to `target` of a known length that starts within `slack` of a tangent angle.
-    pub(crate) fn towards(
+    /// Finds a geodesic from `v` to `target` again, whose tangent `angle` at `v` and `length` are known: the angle on the
+    /// surface within `slack` radians, the length within the fraction `slack`.
+    pub(super) fn towards(
         &mut self,
         mesh: &TriMesh,
         corners: &Corners,
@@ -181,7 +195,7 @@ impl Unfolding {
         target: VertexId,
         (angle, length): (f64, f64),
         slack: f64,
-    ) -> Option<Geodesic> {
+    ) -> Option<UnfoldedGeodesic> {
         self.windows.clear();
         let raw = angle / corners.scale[v.index()];
         let full = corners.total[v.index()];
@@ -211,6 +225,8 @@ impl Unfolding {
         found
     }
 
+    /// Adds the window of the edge opposite the source in the corner of `h`, for the directions `between` two angles from
+    /// `h`, or all.
     fn push_corner(&mut self, mesh: &TriMesh, h: HalfedgeId, between: Option<(f64, f64)>) {
         let angle = mesh.corner_angle(h);
         let a = DVec2::new(mesh.vector(h).length(), 0.0);
@@ -222,11 +238,12 @@ impl Unfolding {
         self.windows.push(Window { halfedge: mesh.next(h), start: h, a, b, low, high, parent: ROOT });
     }
 
+    /// Unfolds the triangles behind the windows, breadth first, until `visit` breaks.
     fn expand(
         &mut self,
         mesh: &TriMesh,
         inside: impl Fn(VertexId) -> bool,
-        mut visit: impl FnMut(Geodesic) -> ControlFlow<()>,
+        mut visit: impl FnMut(UnfoldedGeodesic) -> ControlFlow<()>,
     ) {
         let mut next = 0;
         while next < self.windows.len().min(MAX_WINDOWS) {
@@ -239,7 +256,7 @@ impl Unfolding {
             let (from_low, to_high) = (sine(w.low, c), sine(c, w.high));
             if from_low >= -GRAZING && to_high >= -GRAZING {
                 let end = mesh.prev(twin);
-                let geodesic = Geodesic {
+                let geodesic = UnfoldedGeodesic {
                     target: apex,
                     length: c.length(),
                     start: w.start,
@@ -263,8 +280,8 @@ impl Unfolding {
         }
     }
 
-    /// The mesh edges a geodesic of the last unfolding crosses, in order.
-    pub(crate) fn crossings(&self, g: &Geodesic) -> Vec<EdgeCrossing> {
+    /// The mesh edges that a geodesic of the last unfolding crosses, in order.
+    pub(super) fn crossings(&self, g: &UnfoldedGeodesic) -> Vec<EdgeCrossing> {
         let mut list = Vec::new();
         let mut at = g.window;
         while at != ROOT {
@@ -286,13 +303,13 @@ impl Unfolding {
     }
 }
 
-/// Sine of the angle from `a` to `b`; zero if one of them is.
+/// Sine of the angle from `a` to `b`; zero if one of them is zero.
 fn sine(a: DVec2, b: DVec2) -> f64 {
     let length = a.length() * b.length();
     if length > 0.0 { a.perp_dot(b) / length } else { 0.0 }
 }
 
-/// Where the third corner of the triangle behind a window lies in the plane; `None` if the edge has no length.
+/// Position of the third vertex of the triangle behind a window in the unfolded plane; `None` if the edge has length zero.
 fn unfold_apex(mesh: &TriMesh, w: &Window, apex: VertexId) -> Option<DVec2> {
     let origin = mesh.position(mesh.origin(w.halfedge));
     let u = mesh.vector(w.halfedge).try_normalize()?;
@@ -302,20 +319,21 @@ fn unfold_apex(mesh: &TriMesh, w: &Window, apex: VertexId) -> Option<DVec2> {
     Some(w.a + x * side.dot(u) + outwards * side.cross(u).length())
 }
 
-fn along_spoke(mesh: &TriMesh, h: HalfedgeId) -> Geodesic {
+/// The geodesic along the edge of `h`.
+fn along_edge(mesh: &TriMesh, h: HalfedgeId) -> UnfoldedGeodesic {
     let length = mesh.vector(h).length();
     let position = DVec2::new(length, 0.0);
     let (end, side) = match mesh.twin(h) {
         Some(t) => (t, -position),
         None => (mesh.next(h), DVec2::from_angle(PI - mesh.corner_angle(mesh.next(h)))),
     };
-    Geodesic { target: mesh.target(h), length, start: h, end, position, side, window: ROOT }
+    UnfoldedGeodesic { target: mesh.target(h), length, start: h, end, position, side, window: ROOT }
 }
 
-/// The geodesic along the boundary edge that ends the fan, in the corner of spoke `h`.
-fn along_last_spoke(mesh: &TriMesh, h: HalfedgeId) -> Geodesic {
+/// The geodesic along the boundary edge that arrives at the origin of `h`, in the corner of `h`.
+fn along_last_boundary_edge(mesh: &TriMesh, h: HalfedgeId) -> UnfoldedGeodesic {
     let end = mesh.prev(h);
     let length = mesh.vector(end).length();
     let position = DVec2::from_angle(mesh.corner_angle(h)) * length;
-    Geodesic { target: mesh.origin(end), length, start: h, end, position, side: -position, window: ROOT }
+    UnfoldedGeodesic { target: mesh.origin(end), length, start: h, end, position, side: -position, window: ROOT }
 }

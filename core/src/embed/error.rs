@@ -27,42 +27,42 @@ pub enum EmbeddingError {
         /// The arc.
         arc: usize,
     },
-    /// An edge of the surface is missing from the drawing.
-    #[error("{edge:?} is missing from the drawing of the layout")]
+    /// No edge of the initial embedding crosses or covers an edge of the surface.
+    #[error("the initial embedding does not cover {edge:?} of the surface")]
     Edge {
         /// The edge.
         edge: EdgeId,
     },
-    /// The layout's turning numbers do not add up at a vertex.
-    #[error("the layout turns by {quarters} quarters too much around {vertex:?}")]
+    /// The turning numbers of the layout contradict each other at a vertex.
+    #[error("the turning number of the layout around {vertex:?} is {quarters} quarters too large")]
     Turning {
         /// The vertex.
         vertex: VertexId,
-        /// How many quarters too much.
+        /// Its excess, in quarter turns.
         quarters: i32,
     },
     /// The mesh with the nodes inserted is not a manifold.
-    #[error("the layout's nodes do not fit into the mesh: {0}")]
+    #[error("the nodes of the layout cannot be inserted into the mesh: {0}")]
     Mesh(#[from] TriMeshError),
-    /// No map without folds was found.
-    #[error("no map without folds was found")]
-    Folded,
+    /// No injective map was found.
+    #[error("no injective map was found: triangles remain flipped")]
+    NoInjectiveMap,
     /// The arcs could not be traced in the map.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The arcs missing from a partial layout do not emerge from the map.
-    #[error("the missing arcs do not emerge: {0}")]
-    Emerge(#[from] CompletionError),
-    /// The patches are not the rectangles the layout says.
+    /// The map does not complete a partial layout.
+    #[error("the map does not complete the layout: {0}")]
+    Completion(#[from] CompletionError),
+    /// The patches are not rectangles of the map.
     #[error(transparent)]
     Rectangle(#[from] RectangleError),
-    /// What is left without collapsed chords could not be drawn.
+    /// The layout that remains after chords were collapsed has no initial embedding.
     #[error(transparent)]
-    Redraw(#[from] crate::layout::ReembeddingError),
-    /// The mesh could not be simplified to embed the layout on that first.
+    Reembedding(#[from] crate::layout::ReembeddingError),
+    /// The mesh could not be simplified to a proxy.
     #[error(transparent)]
     Proxy(#[from] crate::proxy::ProxyError),
-    /// The patches of the drawing could not be mapped.
+    /// The patches of the initial embedding could not be mapped.
     #[error(transparent)]
     Patch(#[from] PatchError),
     /// A linear system could not be solved.

@@ -1,21 +1,16 @@
-//! What goes into an optimisation, what is seen of it on the way, and what comes out.
+//! The input of an optimisation: surface, layout, initial embedding and settings.
 
-use glam::DVec3;
-use serde::Serialize;
-
-use crate::embed::parameterise::quality::Measures;
-use crate::embed::pipeline::chord_collapse::{CollapsedChord, UncollapsedChord};
 use crate::embed::topology::embedding_topology::ArcHeadings;
-use crate::layout::{Embedding, PatchMap, QuadLayout};
+use crate::layout::{Embedding, QuadLayout};
 use crate::mesh::TriMesh;
 use crate::surface::{PrincipalCurvature, SurfaceIndex};
 
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface<'a> {
-    /// Its mesh, of bounding-box diagonal 1.
+    /// Its mesh, scaled to a bounding-box diagonal of 1.
     pub mesh: &'a TriMesh,
-    /// Its points by nearness.
+    /// Spatial index of the mesh, for nearest points.
     pub index: &'a SurfaceIndex,
     /// Principal curvatures at its vertices.
     pub curvature: &'a [PrincipalCurvature],
@@ -23,29 +18,33 @@ pub struct Surface<'a> {
     pub sharp: &'a [bool],
 }
 
-/// How an embedding is optimised.
+/// Settings of an optimisation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Steps of the nodes at most: with least squares, and as many again without folds.
+    /// Largest number of node steps: of the least-squares map, and as many again of the injective map.
     pub steps: usize,
-    /// Halvings of the step at most.
+    /// Largest number of successive halvings of the step size; an injective map takes at most 2.
     pub halvings: usize,
-    /// By how much an error of direction counts more than one of length.
+    /// Anisotropy ρ of the norm: by what factor misalignment counts more than sizing error (section 6.4.3); at least 1.
     pub anisotropy: f64,
-    /// Whether lengths may vary over the surface as the field wants it.
+    /// Whether target lengths vary over the surface so that the sized field has less curl.
     pub sizing: bool,
-    /// Least length of an arc in the map, in mean edges of the mesh.
+    /// Least length of an arc in the map, as a multiple of the mean edge length of the mesh.
     pub spacing: f64,
-    /// The length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: they are held apart.
+    /// Length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: such chords are kept
+    /// at the least length.
     pub collapse: Option<f64>,
-    /// Whether chords are collapsed, one by one, as long as that makes the layout less irregular and the energy no more.
+    /// Whether chords are collapsed one by one as long as that makes the layout less irregular without raising the
+    /// energy.
     pub simplify: bool,
-    /// The edge length that all chords are to be multiples of in the end, likewise; `None`: lengths are free.
+    /// Edge length that all chord lengths are to be multiples of, in the same unit as `collapse`; `None`: lengths are
+    /// free.
     pub integer: Option<f64>,
 }
 
 impl Default for Settings {
-    /// Those of the thesis (sections 6.4.3 and 6.5.1); arcs are long enough that triangles can resolve the patches.
+    /// Steps, halvings, anisotropy and sizing as in the thesis (sections 6.4.3 and 6.5.1). With a `spacing` of 1.5 a
+    /// patch is wide enough to be resolved by triangles.
     fn default() -> Self {
         Self {
             steps: 25,
@@ -60,107 +59,39 @@ impl Default for Settings {
     }
 }
 
-/// A layout to be embedded.
+/// A layout to be embedded on a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     /// The surface.
     pub surface: Surface<'a>,
-    /// The layout's structure; without patches where arcs are missing.
+    /// The structure of the layout; a partial layout, where arcs are missing, has no patches.
     pub layout: &'a QuadLayout,
-    /// A rough drawing of it.
+    /// Its initial embedding.
     pub initial_embedding: &'a Embedding,
-    /// The headings of the arcs' sides in the charts of the regions between them.
+    /// The headings of both sides of every arc, in the charts of the regions beside it.
     pub arc_headings: &'a [ArcHeadings],
-    /// Nodes that are to stay where the drawing has them; empty: none.
+    /// Whether each node keeps its initial position; empty: none does.
     pub pinned_nodes: &'a [bool],
-    /// Arcs whose ends are to stay where the drawing has them; empty: none. Between its ends an arc is an isoline.
+    /// Whether the two end nodes of each arc keep their initial positions; empty: none does. Between its ends the arc
+    /// is an isoline like any other.
     pub pinned_arcs: &'a [bool],
-    /// How to go about it.
+    /// The settings.
     pub settings: Settings,
 }
 
-/// The embedding while it is being optimised.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    /// Steps made so far.
-    pub step: usize,
-    /// The energy of the map, as a fraction of that with which this phase began: least squares and maps without folds
-    /// have energies of their own.
-    pub energy: f64,
-    /// Triangles that the map turns over.
-    pub flipped: usize,
-    /// Where the nodes are.
-    pub nodes: Vec<DVec3>,
-    /// The arcs as polylines; `None` for those that cannot be followed because of folds.
-    pub arcs: Vec<Option<Vec<DVec3>>>,
-}
+impl Problem<'_> {
+    /// Area of the surface.
+    pub(in crate::embed) fn area(&self) -> f64 {
+        self.surface.mesh.faces().map(|f| self.surface.mesh.face_area(f)).sum()
+    }
 
-/// Whether to go on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
-    /// Go on.
-    Continue,
-    /// Finish with the best so far.
-    Finish,
-}
-
-/// A triangle that the map turns over in the end.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RemainingFlip {
-    /// A point in it.
-    pub at: [f64; 3],
-    /// Why it could not be unfolded.
-    pub reason: String,
-}
-
-/// What an optimisation has achieved.
-#[derive(Debug, Clone, Serialize)]
-pub struct EmbeddingReport {
-    /// Steps of the nodes.
-    pub steps: usize,
-    /// Energy of the map over the area of the surface, with the nodes where the drawing had them.
-    pub energy_before: f64,
-    /// The same in the end.
-    pub energy_after: f64,
-    /// Triangles turned over at first.
-    pub flipped_before: usize,
-    /// Triangles turned over when the nodes had come to rest, before folds were removed.
-    pub flipped_at_rest: usize,
-    /// Those left.
-    pub folds: Vec<RemainingFlip>,
-    /// Chords that were collapsed, in order.
-    pub collapsed: Vec<CollapsedChord>,
-    /// Chords that were to be collapsed and could not be.
-    pub short: Vec<UncollapsedChord>,
-    /// Edges of features.
-    pub features: FeatureEdges,
-    /// Measures of all patches together.
-    pub measures: Measures,
-}
-
-/// Sharp edges inside the surface, on the mesh that the layout is embedded on, which may be finer than that given.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FeatureEdges {
-    /// How many there are.
-    pub all: usize,
-    /// How many lie on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which the
-    /// surface's bounding-box diagonal is 1.
-    pub on_isolines: usize,
-    /// The ends of those that do not.
-    pub off: Vec<[[f64; 3]; 2]>,
-}
-
-/// A layout with its optimised embedding.
-#[derive(Debug, Clone)]
-pub struct OptimisedEmbedding {
-    /// The layout; of a partial one, with the arcs and nodes that have emerged after those given.
-    pub layout: QuadLayout,
-    /// Its nodes and arcs on the surface.
-    pub embedding: Embedding,
-    /// The maps of its patches.
-    pub maps: Vec<PatchMap>,
-    /// Where chords were collapsed, the rough drawing of what was left of the layout.
-    pub initial_embedding: Option<Embedding>,
-    /// What was achieved.
-    pub report: EmbeddingReport,
+    /// For each node whether it is pinned, itself or as the end of a pinned arc.
+    pub(in crate::embed) fn pinned(&self) -> Vec<bool> {
+        let mut pinned = self.pinned_nodes.to_vec();
+        pinned.resize(self.layout.nodes.len(), false);
+        for (arc, _) in self.layout.arcs.iter().zip(self.pinned_arcs).filter(|pair| *pair.1) {
+            arc.nodes.iter().for_each(|&n| pinned[n as usize] = true);
+        }
+        pinned
+    }
 }

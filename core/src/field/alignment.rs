@@ -1,93 +1,95 @@
-//! Directions that crosses should follow: principal directions, features and boundaries.
+//! Direction penalties: alignment of fields with principal directions, features and boundaries.
 //!
-//! Where the surface bends much more one way than the other its principal directions mean something; where it is
-//! flat or round they are noise (Campen, section 6.3.2, after Bommes et al., Mixed-Integer Quadrangulation). There,
-//! reliable triangles are selected and held with a penalty of 100. Here the weight of each triangle is continuous,
-//! the square of `κ₁ − κ₂` times the triangle's area, for three reasons: it is what a deviation costs in the
-//! alignment measure; it has no threshold at which the field could break; and it is a pure number, so that the pull
-//! of a piece of surface depends neither on its size nor on how finely it is meshed. As a direction prevails over a
-//! distance inverse to `κ₁ − κ₂`, of about the radius of the bend, fine detail aligns the field near it and a
-//! gentle bend over a wide area.
+//! Principal directions are reliable where the surface is anisotropic, that is where `κ₁ − κ₂` is large; on flat and
+//! spherical parts they are noise. Campen (section 6.3.2, after Bommes et al., Mixed-Integer Quadrangulation) selects
+//! reliable triangles and gives them a penalty weight of 100. Here the weight is continuous, `(κ₁ − κ₂)²` times the
+//! triangle's area: this is how a deviation counts in the measure of alignment, it has no threshold at which the field
+//! could change discontinuously, and being dimensionless it depends neither on scale nor on the fineness of the mesh. A
+//! direction then prevails over smoothness within a distance inverse to `κ₁ − κ₂`, about the radius of the bend.
 
-use crate::field::{DirectionPenalty, RELIABLE_PENALTY};
+use super::guiding_field::{DirectionPenalty, RELIABLE_PENALTY};
+use super::smoothing::EQUILATERAL_EDGE_WEIGHT;
 use crate::mesh::{FaceId, TriMesh};
 use crate::surface::Metric;
 use crate::surface::PrincipalCurvature;
 use crate::surface::face_curvature;
 
-/// The distance over which a principal direction prevails is the inverse of the strength times `κ₁ − κ₂`.
-///
-/// In maps of least squares: with more, these follow with more residual and more folds.
+/// Strength of alignment in least-squares maps, a pure number: a principal direction prevails within the inverse of the
+/// strength times `κ₁ − κ₂`. With larger values these maps have more residual and more flipped triangles.
 const STRENGTH: f64 = 1.7;
-/// In maps without folds, which can follow more. Measured at 1.7, 2.6 and, with sizes counting less, 3.5:
-/// directions deviate by 4.3°, 3.7° and 3.2° (Fertility, 84 patches), 3.9°, 3.0° and 2.6° (cino_3holes) and 5.6°, 4.7° and 4.2°
-/// (rocker arm, 68), and the conformal distortion over 2 is 0.021, 0.031 and 0.042, 0.023, 0.029 and 0.033, 0.028, 0.046 and
-/// 0.058.
-const STRENGTH_WHOLE: f64 = 3.5;
-/// Length of features, in square roots of the surface's area, from which on they carry the shape: there maps without folds
-/// follow no more than least squares do, or features could not be held (on the fan disk at 2.6 none).
-const CREASED: f64 = 4.0;
-/// Largest `κ₁ − κ₂` that counts, in inverse bounding-box diagonals: no bend is seen sharper than the ball of radius
-/// 0.03 that curvature is averaged over, larger values stem from slivers and creases.
-const MOST: f64 = 40.0;
-/// `(κ₁ − κ₂) / (|κ₁| + |κ₂|)`, 0 on a sphere and 1 on cylinders and saddles, where guides begin and where they are
-/// full. On a sphere of 4000 points that are off by up to a thousandth of the diagonal nine tenths of the triangles
-/// show less than 0.18.
-const ANISOTROPIC: [f64; 2] = [0.2, 0.6];
-/// Guides weaker than this prevail nowhere in less than the whole surface.
-const LEAST: f64 = 1.0;
-/// The smoothness weight of an edge between equilateral triangles, its length over the distance of their centres.
-const EQUILATERAL: f64 = 1.732_050_807_568_877_2;
+/// Strength of alignment in locally injective maps. Measured at 1.7, 2.6 and, with sizing weighted less, 3.5: directions
+/// deviate by 4.3°, 3.7° and 3.2° (Fertility, 84 patches), 3.9°, 3.0° and 2.6° (cino_3holes), 5.6°, 4.7° and 4.2° (rocker
+/// arm, 68 patches); the conformal distortion exceeds 2 by 0.021, 0.031 and 0.042, by 0.023, 0.029 and 0.033, by 0.028,
+/// 0.046 and 0.058.
+const INJECTIVE_STRENGTH: f64 = 3.5;
+/// Total length of features, in square roots of the surface's area, above which [`STRENGTH`] serves for locally injective
+/// maps too: with more, features could not be made constraints (on the fan disk at 2.6 none).
+const FEATURE_DOMINATED: f64 = 4.0;
+/// Largest `κ₁ − κ₂` that counts, in inverse bounding-box diagonals. Curvature is averaged over balls of radius 0.03, so no
+/// bend is seen sharper; larger values stem from slivers and creases.
+const MAX_DIFFERENCE: f64 = 40.0;
+/// Anisotropy `(κ₁ − κ₂) / (|κ₁| + |κ₂|)` (0 on spheres, 1 on cylinders and saddles) up to which there is no penalty, and from
+/// which on it is full. On a sphere of 4000 points with noise of up to a thousandth of the diagonal nine tenths of the
+/// triangles have less than 0.18.
+const ANISOTROPY: [f64; 2] = [0.2, 0.6];
+/// Least weight of a penalty, in inverse squared bounding-box diagonals: below, the direction prevails in no part of the
+/// surface.
+const MIN_WEIGHT: f64 = 1.0;
 
-/// The reliable principal directions, by triangle, for a map of least squares or one that is `whole`, without folds.
-/// `curvature` has an entry per vertex, `sharp` a flag per edge (empty: none). Corners on sharp edges tell nothing of the
-/// smooth surface beside them and are left out.
+/// Penalties for deviation from the reliable principal directions, by ascending triangle, for a least-squares map or a
+/// locally `injective` one. `curvature` has an entry per vertex, `sharp` a flag per edge (empty: none). Vertices on sharp
+/// edges are left out: their curvature is that of the crease.
 pub fn principal_direction_penalties(
     mesh: &TriMesh,
     metric: &Metric,
     curvature: &[PrincipalCurvature],
     sharp: &[bool],
-    whole: bool,
+    injective: bool,
 ) -> Vec<DirectionPenalty> {
-    let strength = if whole && !is_feature_dominated(mesh, sharp) { STRENGTH_WHOLE } else { STRENGTH };
+    let strength = if injective && !is_feature_dominated(mesh, sharp) { INJECTIVE_STRENGTH } else { STRENGTH };
     let mut on_crease = vec![false; mesh.n_vertices()];
     for e in mesh.edges().filter(|e| sharp.get(e.index()).copied().unwrap_or(false)) {
         for v in mesh.edge_vertices(e) {
             on_crease[v.index()] = true;
         }
     }
-    let bending = face_curvature(mesh, curvature, |v| !on_crease[v.index()]);
-    let guide = |face: FaceId| {
-        let pull = pull(&bending[face.index()], strength)?;
-        let angle = metric.angle_of(mesh, face, bending[face.index()].d_max)?;
-        Some(DirectionPenalty { face, angle, weight: pull * metric.area(face) / EQUILATERAL, branch: None })
+    let face_curvature = face_curvature(mesh, curvature, |v| !on_crease[v.index()]);
+    let penalty = |face: FaceId| {
+        let weight = penalty_weight(&face_curvature[face.index()], strength)?;
+        let angle = metric.angle_of(mesh, face, face_curvature[face.index()].d_max)?;
+        Some(DirectionPenalty {
+            face,
+            angle,
+            weight: weight * metric.area(face) / EQUILATERAL_EDGE_WEIGHT,
+            branch: None,
+        })
     };
-    mesh.faces().filter_map(guide).collect()
+    mesh.faces().filter_map(penalty).collect()
 }
 
-/// Whether features carry the shape of a surface; a flag per edge (empty: none).
+/// Whether the features (a flag per edge; empty: none) are so long in total that they determine the shape.
 pub(crate) fn is_feature_dominated(mesh: &TriMesh, sharp: &[bool]) -> bool {
     let length: f64 = mesh.edges().zip(sharp).filter(|(_, sharp)| **sharp).map(|(e, _)| mesh.edge_length(e)).sum();
     let area: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
-    length > CREASED * area.sqrt()
+    length > FEATURE_DOMINATED * area.sqrt()
 }
 
-/// The weight of a guide in inverse squared lengths; `None` where the directions mean nothing.
-fn pull(c: &PrincipalCurvature, strength: f64) -> Option<f64> {
+/// The weight of a penalty per area, in inverse squared lengths; `None` where directions are unreliable.
+fn penalty_weight(c: &PrincipalCurvature, strength: f64) -> Option<f64> {
     let difference = c.k_max - c.k_min;
     let relative = difference / (c.k_min.abs() + c.k_max.abs()).max(f64::MIN_POSITIVE);
-    let pull = ramp(relative, ANISOTROPIC) * (strength * difference.min(MOST)).powi(2);
-    (pull > LEAST).then_some(pull)
+    let weight = ramp(relative, ANISOTROPY) * (strength * difference.min(MAX_DIFFERENCE)).powi(2);
+    (weight > MIN_WEIGHT).then_some(weight)
 }
 
-/// 0 up to the first bound, 1 from the second on, and smooth between.
+/// 0 up to the first bound, 1 from the second on, a cubic with zero slope at both between.
 fn ramp(x: f64, [from, to]: [f64; 2]) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The directions of the edges marked in `along` (features, boundaries to be followed; one flag per edge), one for
-/// each triangle at each edge, all of full weight.
+/// Penalties of weight [`RELIABLE_PENALTY`] for deviation from the edges marked in `along` (features, boundaries; a flag per
+/// edge), one for each triangle beside each edge.
 pub fn feature_direction_penalties(mesh: &TriMesh, metric: &Metric, along: &[bool]) -> Vec<DirectionPenalty> {
     let marked = mesh.halfedges().filter(|&h| along[mesh.edge(h).index()]);
     marked
@@ -113,7 +115,7 @@ mod tests {
     use crate::surface::principal_curvature;
     use crate::testing::{grid, square};
 
-    fn guides(mesh: &TriMesh) -> Vec<DirectionPenalty> {
+    fn penalties(mesh: &TriMesh) -> Vec<DirectionPenalty> {
         let curvature = principal_curvature(mesh, 0.03, &vec![false; mesh.n_edges()]);
         principal_direction_penalties(mesh, &Metric::new(mesh), &curvature, &[], false)
     }
@@ -124,20 +126,20 @@ mod tests {
     }
 
     #[test]
-    fn bent_surfaces_guide_and_round_or_flat_ones_do_not() {
-        assert!(guides(&square(12)).is_empty());
-        assert!(guides(&octasphere(24)).is_empty());
+    fn cylinders_and_saddles_have_penalties_and_spheres_and_planes_none() {
+        assert!(penalties(&square(12)).is_empty());
+        assert!(penalties(&octasphere(24)).is_empty());
         // Of radius 0.1 and along z.
         let cylinder =
             grid(60, 50, [true, false], |u, v| DVec3::new(0.1 * (TAU * u).cos(), 0.1 * (TAU * u).sin(), 0.8 * v));
         let metric = Metric::new(&cylinder);
-        let found = guides(&cylinder);
+        let found = penalties(&cylinder);
         assert_eq!(found.len(), cylinder.n_faces());
         for g in found {
             let axis = metric.angle_of(&cylinder, g.face, DVec3::Z).unwrap();
             let z = cylinder.face_vertices(g.face).map(|v| cylinder.position(v).z).iter().sum::<f64>() / 3.0;
             assert!(off_quarter(g.angle - axis) < 1e-2, "{g:?}");
-            let full = (10.0 * STRENGTH).powi(2) * metric.area(g.face) / EQUILATERAL;
+            let full = (10.0 * STRENGTH).powi(2) * metric.area(g.face) / EQUILATERAL_EDGE_WEIGHT;
             assert!((g.weight / full - 1.0).abs() < 0.05 || !(0.05..0.75).contains(&z), "{g:?} {full}");
         }
         // A saddle of curvatures 4 and -4.
@@ -145,22 +147,22 @@ mod tests {
             let (x, y) = (0.5 * (u - 0.5), 0.5 * (v - 0.5));
             DVec3::new(x, y, 2.0 * (x * x - y * y))
         });
-        assert!(guides(&saddle).len() * 10 > saddle.n_faces() * 9);
+        assert!(penalties(&saddle).len() * 10 > saddle.n_faces() * 9);
     }
 
     #[test]
-    fn guides_are_stronger_once_the_map_cannot_fold_but_not_where_creases_carry_the_shape() {
+    fn alignment_is_stronger_in_injective_maps_unless_features_dominate() {
         let tube =
             grid(60, 50, [true, false], |u, v| DVec3::new(0.1 * (TAU * u).cos(), 0.1 * (TAU * u).sin(), 0.8 * v));
         let (metric, none) = (Metric::new(&tube), vec![false; tube.n_edges()]);
         let curvature = principal_curvature(&tube, 0.03, &none);
-        let weight = |sharp: &[bool], whole| {
-            principal_direction_penalties(&tube, &metric, &curvature, sharp, whole)
+        let weight = |sharp: &[bool], injective| {
+            principal_direction_penalties(&tube, &metric, &curvature, sharp, injective)
                 .iter()
                 .map(|g| g.weight)
                 .sum::<f64>()
         };
-        let stronger = (STRENGTH_WHOLE / STRENGTH).powi(2);
+        let stronger = (INJECTIVE_STRENGTH / STRENGTH).powi(2);
         assert!((weight(&none, true) / weight(&none, false) / stronger - 1.0).abs() < 1e-9);
         // Every fifth ring of edges all around: ten times the circumference.
         let sharp: Vec<bool> = tube
@@ -174,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn features_guide_the_triangles_beside_them() {
+    fn features_align_the_triangles_beside_them() {
         let mesh = square(3);
         let metric = Metric::new(&mesh);
         let along: Vec<bool> = mesh.edges().map(|e| mesh.is_boundary_edge(e)).collect();
@@ -189,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn guides_align_the_field_of_a_real_shape_without_further_singularities() {
+    fn penalties_align_the_field_of_a_real_shape_with_few_more_singularities() {
         let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
             || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
             std::path::PathBuf::from,
@@ -204,17 +206,17 @@ mod tests {
         drop_short_features(&mesh, &mut sharp, SHORT_FEATURE);
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
         let found = principal_direction_penalties(&mesh, &metric, &curvature, &sharp, false);
-        let bending = face_curvature(&mesh, &curvature, |_| true);
+        let face_curvature = face_curvature(&mesh, &curvature, |_| true);
         let (mut directions, mut weights) = (vec![DVec3::ZERO; mesh.n_faces()], vec![0.0; mesh.n_faces()]);
         for g in &found {
             directions[g.face.index()] = metric.tangent(&mesh, g.face, g.angle);
-            weights[g.face.index()] = g.weight * EQUILATERAL / metric.area(g.face);
+            weights[g.face.index()] = g.weight * EQUILATERAL_EDGE_WEIGHT / metric.area(g.face);
         }
         let of = |weights: &[f64]| {
-            let guides = AlignmentDirections { directions: &directions, weights, radius: 1.0 };
-            let field = feature_aligned_field(&mesh, &metric, Some(guides), &sharp, &Progress::new()).unwrap();
+            let towards = AlignmentDirections { directions: &directions, weights, radius: 1.0 };
+            let field = feature_aligned_field(&mesh, &metric, Some(towards), &sharp, &Progress::new()).unwrap();
             let (mut sum, mut total) = (0.0, 0.0);
-            for (f, c) in mesh.faces().zip(&bending) {
+            for (f, c) in mesh.faces().zip(&face_curvature) {
                 let weight = (c.k_max - c.k_min).powi(2) * metric.area(f);
                 let along = metric.angle_of(&mesh, f, c.d_max).unwrap();
                 sum += weight * off_quarter(field.angle[f.index()] - along).to_degrees();
@@ -222,7 +224,7 @@ mod tests {
             }
             (sum / total, field.singularities.len())
         };
-        let (free, guided) = (of(&vec![0.0; mesh.n_faces()]), of(&weights));
-        assert!(guided.0 < 5.0 && free.0 > 15.0 && guided.1 <= free.1 + 4, "{free:?} {guided:?}");
+        let (free, aligned) = (of(&vec![0.0; mesh.n_faces()]), of(&weights));
+        assert!(aligned.0 < 5.0 && free.0 > 15.0 && aligned.1 <= free.1 + 4, "{free:?} {aligned:?}");
     }
 }

@@ -1,92 +1,88 @@
-//! Curves that run along edges of the mesh: from a curve per edge to ordered paths.
+//! Curves along mesh edges: from a curve number per edge to ordered paths with smoothed tangents.
 //!
-//! Where a curve crosses itself four of its edges meet in one vertex; opposite ones belong together, because
-//! crossings are transversal. Curves may end at the boundary only.
+//! Where a curve crosses itself, four of its edges meet at a vertex; opposite ones are joined, since crossings are
+//! transversal. Curves may end at the boundary only.
 //!
-//! Such a path zigzags on the scale of the triangles, and fields must not follow that. Its direction is therefore
-//! averaged: the turns at its vertices, measured by the angles on both sides, unroll it into a staircase of angles
-//! over arc length, whose mean over a window says by how much each edge leans away from the curve it stands for.
+//! An edge path zigzags at the scale of the triangles, which fields must not follow, so its tangent is averaged. The turning
+//! angles at its vertices, each the mean of those measured on the left and on the right, give the direction of the path as
+//! a step function of arc length; its mean over a window around an edge, less the direction of the edge, is the edge's
+//! tangent offset.
 
 use std::f64::consts::PI;
 
-use super::{FieldError, expect_length};
+use super::error::{FieldError, expect_length};
 use crate::mesh::{EdgeId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
 
-/// Half the window over which directions are averaged, in mean edge lengths.
-const WINDOW: f64 = 2.0;
+/// Half the width of the window over which tangents are averaged, in mean edge lengths; chosen by hand. Zero would leave the
+/// directions of the edges.
+const HALF_WINDOW: f64 = 2.0;
 
-/// An edge passed in one direction.
+/// An edge walked in one direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// The edge.
     pub edge: EdgeId,
-    /// Whether it is passed in the direction of [`TriMesh::halfedge`].
+    /// Whether it is walked in the direction of [`TriMesh::halfedge`].
     pub forward: bool,
 }
 
 impl Step {
-    /// The half-edge in the direction of the step, left of it; `None` if there is no triangle.
+    /// The half-edge along the step, in the triangle left of it; `None` on the boundary.
     pub fn left(self, mesh: &TriMesh) -> Option<HalfedgeId> {
         let h = mesh.halfedge(self.edge);
         if self.forward { Some(h) } else { mesh.twin(h) }
     }
 
-    /// The half-edge against the direction of the step, right of it; `None` if there is no triangle.
+    /// The half-edge against the step, in the triangle right of it; `None` on the boundary.
     pub fn right(self, mesh: &TriMesh) -> Option<HalfedgeId> {
         self.reversed().left(mesh)
     }
 
-    /// The same edge passed the other way.
+    /// The same edge walked in the other direction.
     pub fn reversed(self) -> Self {
         Self { edge: self.edge, forward: !self.forward }
     }
 
-    /// The vertex it starts from.
+    /// The vertex it starts at.
     pub fn from(self, mesh: &TriMesh) -> VertexId {
         mesh.edge_vertices(self.edge)[usize::from(!self.forward)]
     }
 
-    /// The vertex it leads to.
+    /// The vertex it ends at.
     pub fn to(self, mesh: &TriMesh) -> VertexId {
         mesh.edge_vertices(self.edge)[usize::from(self.forward)]
     }
 }
 
-/// A curve along edges.
+/// A path along edges: a curve, or one connected part of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EdgePath {
-    /// The curve it is, or is a part of.
+    /// The number of the curve.
     pub curve: u32,
     /// Consecutive edges.
     pub steps: Vec<Step>,
     /// Angle from each edge to the smoothed tangent of the curve, counter-clockwise, in radians.
-    pub lean: Vec<f64>,
-    /// Whether the last step leads to the start of the first; otherwise both ends lie on the boundary.
+    pub tangent_offset: Vec<f64>,
+    /// Whether the last step ends where the first starts; otherwise both ends lie on the boundary.
     pub closed: bool,
 }
 
-/// The spokes of a vertex counter-clockwise, as steps away from it.
-fn spokes(mesh: &TriMesh, v: VertexId) -> Vec<Step> {
-    let away = |h: HalfedgeId| {
+/// The edges at a vertex counter-clockwise, as steps away from it.
+fn steps_from(mesh: &TriMesh, v: VertexId) -> Vec<Step> {
+    let away = |(h, _): (HalfedgeId, VertexId)| {
         let edge = mesh.edge(h);
         Step { edge, forward: mesh.edge_vertices(edge)[0] == v }
     };
-    let mut out: Vec<Step> = mesh.outgoing(v).map(away).collect();
-    if mesh.is_boundary_vertex(v)
-        && let Some(last) = mesh.outgoing(v).last()
-    {
-        out.push(away(mesh.prev(last)));
-    }
-    out
+    mesh.spokes(v).map(away).collect()
 }
 
-/// Orders the edges of each curve into paths, curves ascending, each path starting at its smallest edge or, if it
-/// is open, at one of its ends.
+/// Orders the edges of each curve into paths, by ascending curve. A closed path starts at its smallest edge, an open one at
+/// one of its ends.
 ///
 /// # Errors
 ///
-/// [`FieldError::WrongLength`], or [`FieldError::OpenCurve`] where a curve ends inside the surface.
+/// [`FieldError::WrongLength`], or [`FieldError::OpenCurve`] if a curve ends at an inner vertex.
 pub fn trace_curves(
     mesh: &TriMesh,
     metric: &Metric,
@@ -97,7 +93,7 @@ pub fn trace_curves(
     let mut edges: Vec<(u32, EdgeId)> = mesh.edges().filter_map(|e| Some((curve_of_edge[e.index()]?, e))).collect();
     edges.sort();
     let mut paths = Vec::new();
-    let window = WINDOW * mesh.edges().map(|e| mesh.edge_length(e)).sum::<f64>() / mesh.n_edges().max(1) as f64;
+    let window = HALF_WINDOW * mesh.mean_edge_length();
     for &(curve, e) in &edges {
         if used[e.index()] {
             continue;
@@ -113,22 +109,22 @@ pub fn trace_curves(
         for s in &steps {
             used[s.edge.index()] = true;
         }
-        let lean = lean(mesh, metric, &steps, closed, window);
-        paths.push(EdgePath { curve, steps, lean, closed });
+        let tangent_offset = tangent_offsets(mesh, metric, &steps, closed, window);
+        paths.push(EdgePath { curve, steps, tangent_offset, closed });
     }
     Ok(paths)
 }
 
 impl EdgePath {
-    /// Consecutive steps, as positions in [`Self::steps`].
+    /// Pairs of consecutive steps, as indices into [`Self::steps`].
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let n = self.steps.len();
         (usize::from(!self.closed)..n).map(move |i| ((i + n - 1) % n, i))
     }
 }
 
-/// The half-edges crossed counter-clockwise around the vertex between two steps, from the triangle left of the
-/// second to the triangle left of the first; `None` if the boundary is in between.
+/// The half-edges crossed counter-clockwise around the vertex between steps `a` and `b`, from the triangle left of `b` to
+/// the triangle left of `a`; `None` if the boundary lies between.
 pub(super) fn left_fan(mesh: &TriMesh, a: Step, b: Step) -> Option<Vec<HalfedgeId>> {
     let end = a.left(mesh)?;
     let mut h = b.left(mesh)?;
@@ -143,7 +139,7 @@ pub(super) fn left_fan(mesh: &TriMesh, a: Step, b: Step) -> Option<Vec<HalfedgeI
     }
 }
 
-/// How much a path turns to the left between two steps: half the difference of the angles on its sides.
+/// The angle by which a path turns left between two steps: half the difference of the angles on its right and left.
 fn turn(mesh: &TriMesh, metric: &Metric, a: Step, b: Step) -> f64 {
     let angle = |a: Step, b: Step| {
         let fan = left_fan(mesh, a, b)?;
@@ -158,14 +154,14 @@ fn turn(mesh: &TriMesh, metric: &Metric, a: Step, b: Step) -> f64 {
     }
 }
 
-/// For each step the angle to the mean direction of the path over `window` before and behind its middle.
-fn lean(mesh: &TriMesh, metric: &Metric, steps: &[Step], closed: bool, window: f64) -> Vec<f64> {
+/// For each step, the angle to the mean direction of the path within `window` of the step's midpoint.
+fn tangent_offsets(mesh: &TriMesh, metric: &Metric, steps: &[Step], closed: bool, window: f64) -> Vec<f64> {
     let n = steps.len();
     let length: Vec<f64> = steps.iter().map(|s| mesh.edge_length(s.edge)).collect();
     let turns: Vec<f64> = (0..n)
         .map(|i| if i == 0 && !closed { 0.0 } else { turn(mesh, metric, steps[(i + n - 1) % n], steps[i]) })
         .collect();
-    // A window that is longer than the path would count parts of it twice.
+    // A window longer than a closed path would count parts of it twice.
     let window = window.min(0.25 * length.iter().sum::<f64>());
     (0..n)
         .map(|i| {
@@ -199,21 +195,22 @@ fn lean(mesh: &TriMesh, metric: &Metric, steps: &[Step], closed: bool, window: f
         .collect()
 }
 
-/// Follows a curve from a step until it closes or meets the boundary.
+/// Follows a curve from a step until it closes or ends at the boundary; says whether it closes.
 fn follow(mesh: &TriMesh, of: &[Option<u32>], curve: u32, first: Step) -> Result<(Vec<Step>, bool), FieldError> {
     let mut steps = vec![first];
     let mut at = first;
     loop {
         let vertex = at.to(mesh);
-        let here: Vec<Step> = spokes(mesh, vertex).into_iter().filter(|s| of[s.edge.index()] == Some(curve)).collect();
-        let Some(mine) = here.iter().position(|s| s.edge == at.edge) else { return Ok((steps, false)) };
+        let here: Vec<Step> =
+            steps_from(mesh, vertex).into_iter().filter(|s| of[s.edge.index()] == Some(curve)).collect();
+        let Some(arriving) = here.iter().position(|s| s.edge == at.edge) else { return Ok((steps, false)) };
         if here.len() % 2 == 1 {
             if mesh.is_boundary_vertex(vertex) {
                 return Ok((steps, false));
             }
             return Err(FieldError::OpenCurve { curve, vertex, edge: at.edge });
         }
-        at = here[(mine + here.len() / 2) % here.len()];
+        at = here[(arriving + here.len() / 2) % here.len()];
         if at == first {
             return Ok((steps, true));
         }

@@ -1,15 +1,15 @@
-//! The sizing field: by how much the map is to stretch at each triangle, so that the crosses so sized come from a
-//! map as nearly as possible.
+//! The sizing field: the gradient lengths of a map, chosen so that the sized cross field has little curl.
 //!
-//! Unit crosses that turn are no gradients. Scaled by `e^φ`, the direction fields û and v̂ of a cross of angle θ are
-//! free of curl where `∇φ = J∇θ`, with J the quarter turn counter-clockwise: the curl of `e^φ û` is
-//! `e^φ (∇θ·û − ∇φ·v̂)`, that of `e^φ v̂` is `e^φ (∇θ·v̂ + ∇φ·û)`. Hence `∫ |∇φ − J∇θ|² + φ²/ℓ²` is minimised, with φ
-//! linear between vertices (Campen, section 6.4.3, after Ray et al., Periodic Global Parameterization). The
-//! derivative of J∇θ along an edge is what θ turns across it over the distance of the two centres, and the cotangent
-//! weight is that distance over the edge's length; so the right-hand side at a vertex is the sum of the turns about
-//! it. Inside the surface this is the curvature of the vertex less that of its singularity: φ depends on the
-//! singularities alone, not on the angles between them. The second term keeps φ near 0; without it φ grows towards
-//! singularities and along cones beyond use.
+//! A unit cross field that turns is not a gradient. Scaled by `e^φ`, the directions û and v̂ of a cross of angle θ are free
+//! of curl if `∇φ = J∇θ`, with J the counter-clockwise quarter turn: the curl of `e^φ û` is `e^φ (∇θ·û − ∇φ·v̂)`, that of
+//! `e^φ v̂` is `e^φ (∇θ·v̂ + ∇φ·û)`. Hence `∫ |∇φ − J∇θ|² + φ²/ℓ²` is minimised, with φ linear in triangles (Campen,
+//! section 6.4.3, after Ray et al., Periodic Global Parameterization).
+//!
+//! Along an edge, J∇θ is the residual rotation across the edge over the distance of the two centres, and the cotangent
+//! weight is that distance over the edge's length. So the right-hand side at a vertex is the sum of the residual rotations
+//! around it; at an inner vertex this is its angle defect less its index. φ therefore depends on the singularities only,
+//! not on the angles between them. The second term keeps φ near 0; without it φ diverges towards singularities and along
+//! cones.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -17,31 +17,29 @@ use crate::mesh::{EdgeId, TriMesh};
 use crate::solve::{SolveError, SparseHermitian, SpdFactor, SpdSymbolic};
 use crate::surface::Metric;
 
-/// Distance ℓ over which lengths go back to the mean, in bounding-box diagonals. In maps along guided fields this
-/// lowers the residual of unit lengths from 0.073 to 0.023 (Fertility), 0.147 to 0.025 (elephant), 0.124 to 0.070
-/// (rocker arm), 0.070 to 0.035 (fan disk) and 0.101 to 0.077 (bunny), within 8 percent of what no return would give;
-/// at 0.2 the elephant keeps 0.054.
-const REACH: f64 = 1.0;
-/// Largest length, and reciprocal of the smallest, relative to the mean. Beyond it only the elephant (0.29 to 3.3) and
-/// the rocker arm (2.7) would go, for a gain of at most 5 percent, and quads would be as uneven as lengths.
-const MOST: f64 = 2.5;
-/// Rounds of clamping lengths and restoring their mean, each of which leaves a small part of what the clamps took.
-const ROUNDS: usize = 3;
+/// Length ℓ over which φ decays to 0, in bounding-box diagonals. In maps along guiding fields sizing lowers the residual from
+/// 0.073 to 0.023 (Fertility), 0.147 to 0.025 (elephant), 0.124 to 0.070 (rocker arm), 0.070 to 0.035 (fan disk) and 0.101
+/// to 0.077 (bunny), within 8 percent of the values without decay; with ℓ = 0.2 the elephant keeps 0.054.
+const DECAY_LENGTH: f64 = 1.0;
+/// Largest length, and reciprocal of the smallest, relative to the mean. Without the bound only the elephant (0.29 to 3.3)
+/// and the rocker arm (2.7) would exceed it, with a residual at most 5 percent smaller; quads would be as uneven as lengths.
+const MAX_LENGTH: f64 = 2.5;
+/// Rounds of restoring the area and clamping lengths; each leaves a small part of the area that clamping took.
+const CLAMPING_ROUNDS: usize = 3;
 
-/// For each edge what the cross turns from the triangle of [`TriMesh::halfedge`] to that of its twin beyond the
-/// period jump; 0 on the boundary. `jump` has whole numbers, not reduced modulo four, and what is left is not
-/// reduced either.
+/// The residual rotation of each edge, from the triangle of [`TriMesh::halfedge`] to that of its twin: what the angle turns
+/// beyond the period jump, in radians; 0 on the boundary. Neither `jump` nor the result is reduced modulo full turns.
 pub fn residual_rotations(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<f64> {
-    let rest = |e: EdgeId| {
+    let residual = |e: EdgeId| {
         let h = mesh.halfedge(e);
         let Some(t) = mesh.twin(h) else { return 0.0 };
         let turn = angle[mesh.face(t).index()] - angle[mesh.face(h).index()] - metric.transport(h, t);
         turn - f64::from(jump[e.index()]) * FRAC_PI_2
     };
-    mesh.edges().map(rest).collect()
+    mesh.edges().map(residual).collect()
 }
 
-/// The factored system for sizes on one mesh; serves any cross field on it.
+/// The factored system for the sizing field on a mesh; independent of the cross field.
 #[derive(Debug, Clone)]
 pub struct SizingSystem {
     matrix: SparseHermitian<f64>,
@@ -50,7 +48,7 @@ pub struct SizingSystem {
 }
 
 impl SizingSystem {
-    /// Sets up the system; `symbolic` from an earlier one on a mesh of the same triangles.
+    /// Assembles and factors the system. `symbolic` is that of an earlier system on a mesh of the same triangles, if any.
     ///
     /// # Errors
     ///
@@ -58,7 +56,7 @@ impl SizingSystem {
     pub fn new(mesh: &TriMesh, metric: &Metric, symbolic: Option<SpdSymbolic>) -> Result<Self, SolveError> {
         let mut triplets = Vec::with_capacity(3 * mesh.n_halfedges());
         for f in mesh.faces() {
-            let mass = metric.area(f) / 3.0 / (REACH * REACH);
+            let mass = metric.area(f) / 3.0 / (DECAY_LENGTH * DECAY_LENGTH);
             for h in mesh.face_halfedges(f) {
                 let weight = 0.5 / metric.corner_angle(mesh.prev(h)).tan();
                 let (a, b) = (mesh.origin(h).0, mesh.target(h).0);
@@ -71,36 +69,36 @@ impl SizingSystem {
         Ok(Self { matrix, symbolic, factor })
     }
 
-    /// What the next system on the same triangles can reuse.
+    /// The symbolic analysis, to be reused for a mesh of the same triangles at other positions.
     pub fn symbolic(&self) -> SpdSymbolic {
         self.symbolic.clone()
     }
 
-    /// The lengths that the gradients of u and of v should have in each triangle; such that the map keeps the area of
-    /// the whole. Both are the same: with two scales, free of curl each along one direction only, they would be tied
-    /// to the field's topology by their exchange across odd jumps. `rest` as from [`residual_rotations`].
+    /// The lengths of the gradients of u and v in each triangle, for which the map keeps the total area. `rotation` is as
+    /// from [`residual_rotations`]. Both lengths are equal: two scales, each free of curl along one direction, would be
+    /// exchanged across odd period jumps and so depend on the topology of the field.
     ///
     /// # Errors
     ///
     /// See [`SolveError`].
-    pub fn lengths(&self, mesh: &TriMesh, metric: &Metric, rest: &[f64]) -> Result<Vec<[f64; 2]>, SolveError> {
+    pub fn lengths(&self, mesh: &TriMesh, metric: &Metric, rotation: &[f64]) -> Result<Vec<[f64; 2]>, SolveError> {
         let mut rhs = vec![0.0; mesh.n_vertices()];
         for e in mesh.edges() {
             let h = mesh.halfedge(e);
-            rhs[mesh.target(h).index()] += rest[e.index()];
-            rhs[mesh.origin(h).index()] -= rest[e.index()];
+            rhs[mesh.target(h).index()] += rotation[e.index()];
+            rhs[mesh.origin(h).index()] -= rotation[e.index()];
         }
         let phi = self.factor.solve(&self.matrix, &rhs)?;
         let mean = |f| mesh.face_vertices(f).iter().map(|v| phi[v.index()]).sum::<f64>() / 3.0;
         let mut log: Vec<f64> = mesh.faces().map(mean).collect();
-        for _ in 0..ROUNDS {
+        for _ in 0..CLAMPING_ROUNDS {
             keep_area(mesh, metric, &mut log);
         }
         Ok(log.into_iter().map(|l| [l.exp(); 2]).collect())
     }
 }
 
-/// Shifts logarithms of lengths such that the area stays the same, then clamps them.
+/// Shifts the logarithms of lengths so that the total area of the image is that of the mesh, then clamps them.
 fn keep_area(mesh: &TriMesh, metric: &Metric, log: &mut [f64]) {
     let (mut area, mut image) = (0.0, 0.0);
     for (f, l) in mesh.faces().zip(log.iter()) {
@@ -108,7 +106,7 @@ fn keep_area(mesh: &TriMesh, metric: &Metric, log: &mut [f64]) {
         image += metric.area(f) * (2.0 * l).exp();
     }
     let shift = if image > 0.0 { 0.5 * (area / image).ln() } else { 0.0 };
-    let bound = MOST.ln();
+    let bound = MAX_LENGTH.ln();
     for l in log {
         *l = (*l + shift).clamp(-bound, bound);
     }
@@ -149,13 +147,13 @@ mod tests {
         total
     }
 
-    /// The jumps, not reduced, that leave the smallest rests.
+    /// The jumps, not reduced, of smallest residual rotation.
     fn whole_jumps(mesh: &TriMesh, metric: &Metric, angle: &[f64]) -> Vec<i32> {
         let turns = residual_rotations(mesh, metric, angle, &vec![0; mesh.n_edges()]);
         turns.iter().map(|t| (t / FRAC_PI_2).round() as i32).collect()
     }
 
-    /// How much the lengths for a field of circles and rays lower its curl, on a ring lifted to a cone by `slope`.
+    /// The factor by which sizing lowers the curl of a field of circles and rays, on a ring drawn out to a cone by `slope`.
     fn gain(slope: f64) -> (f64, Vec<[f64; 2]>, TriMesh) {
         let mesh = grid(80, 12, [true, false], |u, v| {
             let r = 0.25 + 0.1 * v;
@@ -170,14 +168,14 @@ mod tests {
             })
             .collect();
         let field = interpolate(&mesh, &metric, &[], &circles, &Progress::new()).unwrap();
-        let rest = residual_rotations(&mesh, &metric, &field.angle, &whole_jumps(&mesh, &metric, &field.angle));
-        let size = SizingSystem::new(&mesh, &metric, None).unwrap().lengths(&mesh, &metric, &rest).unwrap();
+        let rotation = residual_rotations(&mesh, &metric, &field.angle, &whole_jumps(&mesh, &metric, &field.angle));
+        let size = SizingSystem::new(&mesh, &metric, None).unwrap().lengths(&mesh, &metric, &rotation).unwrap();
         let before = curl(&mesh, &metric, &field, &vec![[1.0; 2]; mesh.n_faces()]);
         (before / curl(&mesh, &metric, &field, &size), size, mesh)
     }
 
     #[test]
-    fn circles_and_rays_become_a_gradient() {
+    fn circles_and_rays_are_sized_to_a_gradient() {
         for slope in [0.0, 1.0] {
             let (gain, size, mesh) = gain(slope);
             assert!(gain > 10.0, "{slope} {gain}");
@@ -190,12 +188,12 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_needs_no_other_lengths_and_a_sphere_needs_longer_ones_at_its_corners() {
+    fn lengths_are_one_on_a_cube_and_larger_at_the_corners_of_a_sphere() {
         let lengths = |mesh: &TriMesh, sharp: &[bool]| {
             let metric = Metric::new(mesh);
             let field = feature_aligned_field(mesh, &metric, None, sharp, &Progress::new()).unwrap();
-            let rest = residual_rotations(mesh, &metric, &field.angle, &whole_jumps(mesh, &metric, &field.angle));
-            (SizingSystem::new(mesh, &metric, None).unwrap().lengths(mesh, &metric, &rest).unwrap(), metric, field)
+            let rotation = residual_rotations(mesh, &metric, &field.angle, &whole_jumps(mesh, &metric, &field.angle));
+            (SizingSystem::new(mesh, &metric, None).unwrap().lengths(mesh, &metric, &rotation).unwrap(), metric, field)
         };
         let cube = cells(&[[0, 0, 0]], 6);
         let (even, ..) = lengths(&cube, &sharp_edges(&cube, 0.5));
@@ -213,17 +211,17 @@ mod tests {
     }
 
     #[test]
-    fn an_analysis_serves_other_positions() {
+    fn a_symbolic_analysis_serves_other_positions() {
         let (first, second) =
             (octasphere(6), octasphere(6).positions().iter().map(|&p| p * DVec3::new(1.0, 0.5, 1.0)).collect());
         let faces: Vec<[u32; 3]> = first.faces().map(|f| first.face_vertices(f).map(|v| v.0)).collect();
         let second = TriMesh::from_faces(second, &faces).unwrap();
         let metric = Metric::new(&second);
         let field = feature_aligned_field(&second, &metric, None, &[], &Progress::new()).unwrap();
-        let rest = residual_rotations(&second, &metric, &field.angle, &whole_jumps(&second, &metric, &field.angle));
+        let rotation = residual_rotations(&second, &metric, &field.angle, &whole_jumps(&second, &metric, &field.angle));
         let reused = SizingSystem::new(&first, &Metric::new(&first), None).unwrap().symbolic();
         let lengths =
-            |symbolic| SizingSystem::new(&second, &metric, symbolic).unwrap().lengths(&second, &metric, &rest);
+            |symbolic| SizingSystem::new(&second, &metric, symbolic).unwrap().lengths(&second, &metric, &rotation);
         assert_eq!(lengths(Some(reused)).unwrap(), lengths(None).unwrap());
     }
 }

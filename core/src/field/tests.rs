@@ -23,7 +23,7 @@ fn transport_around_a_vertex_is_its_curvature() {
     for v in mesh.vertices() {
         let around: f64 =
             mesh.outgoing(v).map(|h| mesh.prev(h)).map(|h| metric.transport(h, mesh.twin(h).unwrap())).sum();
-        assert!(period_jumps::wrap(around - metric.curvature(&mesh, v)).abs() < 1e-9);
+        assert!(super::period_jumps::wrap(around - metric.curvature(&mesh, v)).abs() < 1e-9);
     }
 }
 
@@ -71,7 +71,7 @@ fn indices_sum_to_four_times_the_euler_characteristic() {
 #[test]
 fn a_cube_keeps_its_eight_corners() {
     let mesh = cells(&[[0, 0, 0]], 8);
-    let kept = pronounced(&mesh, &shape(&mesh).singularities, 0.05);
+    let kept = cancel_opposite_pairs(&mesh, &shape(&mesh).singularities, 0.05);
     assert_eq!(kept.len(), 8);
     for s in kept {
         assert_eq!(s.index, 1);
@@ -84,12 +84,12 @@ fn close_opposite_singularities_cancel() {
     let mesh = torus(24, 12);
     let at = |v: u32, index: i8| Singularity { vertex: crate::mesh::VertexId(v), index };
     let list = [at(0, 1), at(1, -1), at(100, 2), at(101, -1), at(200, 1)];
-    assert_eq!(pronounced(&mesh, &list, 0.1), vec![at(100, 1), at(200, 1)]);
-    assert_eq!(pronounced(&mesh, &list, 1e-3), list.to_vec());
+    assert_eq!(cancel_opposite_pairs(&mesh, &list, 0.1), vec![at(100, 1), at(200, 1)]);
+    assert_eq!(cancel_opposite_pairs(&mesh, &list, 1e-3), list.to_vec());
 }
 
 #[test]
-fn a_crossing_itself_and_an_open_end_are_told_apart() {
+fn a_curve_may_cross_itself_but_not_end_inside() {
     let mesh = torus(24, 12);
     let mut curves = Vec::new();
     // A meridian and the outer equator of one curve: a figure eight on the torus.
@@ -104,7 +104,7 @@ fn a_crossing_itself_and_an_open_end_are_told_apart() {
 }
 
 #[test]
-fn guides_turn_the_field() {
+fn penalties_turn_the_field() {
     let mesh = torus(48, 12);
     let metric = Metric::new(&mesh);
     let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<glam::DVec3>() / 3.0;
@@ -119,8 +119,8 @@ fn guides_turn_the_field() {
         .collect();
     let weights = vec![1.0; mesh.n_faces()];
     for (radius, most) in [(0.01, true), (10.0, false)] {
-        let guides = AlignmentDirections { directions: &directions, weights: &weights, radius };
-        let field = feature_aligned_field(&mesh, &metric, Some(guides), &[], &Progress::new()).unwrap();
+        let towards = AlignmentDirections { directions: &directions, weights: &weights, radius };
+        let field = feature_aligned_field(&mesh, &metric, Some(towards), &[], &Progress::new()).unwrap();
         let near = |f: &crate::mesh::FaceId| {
             (0..4).any(|b| field.direction(&mesh, &metric, *f, b).dot(directions[f.index()]) > 0.99)
         };
@@ -152,7 +152,7 @@ fn sharp_edges_are_followed() {
 }
 
 #[test]
-fn a_zigzag_leans_away_from_its_edges() {
+fn the_smoothed_tangent_of_a_zigzag_deviates_from_its_edges() {
     // Along a ring's circle, every second vertex moved in and out: edges tilt, the smoothed direction does not.
     let flat = ring(60, 8);
     let mut positions = flat.positions().to_vec();
@@ -168,10 +168,10 @@ fn a_zigzag_leans_away_from_its_edges() {
     }
     let metric = Metric::new(&mesh);
     let path = &trace_curves(&mesh, &metric, &curves).unwrap()[0];
-    for (s, lean) in path.steps.iter().zip(&path.lean) {
-        assert!(lean.abs() > 0.2);
+    for (s, offset) in path.steps.iter().zip(&path.tangent_offset) {
+        assert!(offset.abs() > 0.2);
         let h = s.left(&mesh).unwrap();
-        let tangent = metric.tangent(&mesh, mesh.face(h), metric.direction(h) + lean);
+        let tangent = metric.tangent(&mesh, mesh.face(h), metric.direction(h) + offset);
         let middle = (mesh.position(s.from(&mesh)) + mesh.position(s.to(&mesh))).normalize();
         assert!(tangent.dot(middle).abs() < 0.12, "{}", tangent.dot(middle));
     }
@@ -191,12 +191,12 @@ fn real(name: &str) -> Option<std::sync::Arc<TriMesh>> {
 }
 
 #[test]
-fn real_shapes_have_tens_of_corners() {
+fn real_shapes_keep_tens_of_singularities() {
     for name in ["bunny_7k.off", "rockerarm_5k.obj"] {
         let Some(mesh) = real(name) else { continue };
         let field = shape(&mesh);
         assert_eq!(sum(&field.singularities), 4 * mesh.euler_characteristic());
-        let kept = pronounced(&mesh, &field.singularities, 0.05);
+        let kept = cancel_opposite_pairs(&mesh, &field.singularities, 0.05);
         assert_eq!(sum(&kept), 4 * mesh.euler_characteristic());
         assert!((8..60).contains(&kept.len()), "{name}: {} of {}", kept.len(), field.singularities.len());
     }

@@ -1,8 +1,8 @@
-//! The models that come with the program, made by `examples/make_models`.
+//! The built-in models, made by the example `make_models`.
 
 use super::load::{LoadedMesh, parse};
 
-/// Name and OBJ file of each model, the default one first.
+/// Name and OBJ file of each model; the first is opened by default.
 const MODELS: [(&str, &[u8]); 5] = [
     ("creature", include_bytes!("../../../assets/models/creature.obj")),
     ("rounded-cube", include_bytes!("../../../assets/models/rounded-cube.obj")),
@@ -16,7 +16,7 @@ pub fn builtin_names() -> impl ExactSizeIterator<Item = &'static str> + Clone {
     MODELS.iter().map(|(name, _)| *name)
 }
 
-/// The built-in model of this name.
+/// The built-in model of this name; `None` if there is none.
 pub fn builtin(name: &str) -> Option<LoadedMesh> {
     let (name, bytes) = MODELS.iter().find(|(known, _)| *known == name)?;
     parse(bytes, name).ok()
@@ -28,7 +28,7 @@ mod tests {
     use crate::mesh::Topology;
 
     #[test]
-    fn the_models_are_what_they_should_be() {
+    fn models_have_their_genus_boundary_and_quality() {
         let expected =
             [("creature", 0, 0), ("rounded-cube", 0, 0), ("pretzel", 3, 0), ("torus", 1, 0), ("sleeve", 0, 4)];
         assert!(builtin_names().eq(expected.iter().map(|e| e.0)));

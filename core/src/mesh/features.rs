@@ -1,50 +1,53 @@
-//! Sharp edges, by dihedral angle.
+//! Feature edges, by dihedral angle.
 //!
-//! The angle is that between the normals of the two faces. A sliver has a normal made of rounding errors only;
-//! so a face too thin to have one borrows that of the neighbour across its longest edge, the face it lies
-//! flat against. Then a crease next to a sliver is found on the sliver's other edges, and no false one inside.
+//! The angle is that between the normals of the two faces. The normal of a sliver is rounding error; a face below a least
+//! height therefore takes the normal of the neighbour across its longest edge. A crease beside a sliver is then found at
+//! the sliver's other edges, and the edges between coplanar slivers are not sharp.
 
 use glam::DVec3;
 
-use super::kernel::{FaceId, TriMesh};
+use super::ids::{EdgeId, FaceId};
+use super::kernel::TriMesh;
+use super::traversal::BreadthFirst;
 
-/// Default threshold of [`sharp_edges`] in radians: 40°. A round tube of only twelve sides bends by 30° at each
-/// edge and is meant smooth; the flattest crease common in machine parts is a 45° chamfer.
+/// Default threshold of [`sharp_edges`] in radians: 40°. It lies between the 30° of a smooth tube tessellated with twelve
+/// sides and the 45° of a chamfer, the flattest crease common in machine parts.
 pub const SHARP_DIHEDRAL: f64 = 40.0 * std::f64::consts::PI / 180.0;
 
-/// Default length for [`drop_short_features`]: a fifth of the bounding-box diagonal. Of the models tried, those of
-/// machine parts keep all their creases at this length and those of animals and statues lose nearly all
-/// they have at 40°, which are noise and coarse tessellation.
+/// Default least length of features for [`drop_short_features`], in bounding-box diagonals. Of the models tried, machine
+/// parts keep all their creases at this value; animals and statues lose nearly all edges sharper than 40°, which there are
+/// noise and coarse tessellation. Zero keeps all sharp edges.
 pub const SHORT_FEATURE: f64 = 0.2;
 
-/// A face of smaller height than this (in bounding-box diagonals) has no normal of its own. Files mostly hold six or
-/// seven digits, so positions are off by up to 1e-6, and a height of 2e-5 leaves the normal uncertain by 3°.
-const THIN: f64 = 2e-5;
+/// Least height of a face whose own normal is used, in bounding-box diagonals. Files mostly hold six or seven digits:
+/// positions are off by up to 1e-6, and at this height the normal by up to 3°.
+const MIN_HEIGHT: f64 = 2e-5;
 
-/// For each edge whether its faces meet at an angle of more than `dihedral` radians away from flat; boundary edges
-/// are not sharp. Expects a mesh normalised to bounding-box diagonal 1.
+/// For each edge, whether the normals of its faces differ by more than `dihedral` radians. Boundary edges are not sharp.
+/// The mesh must be normalised to bounding-box diagonal 1.
 pub fn sharp_edges(mesh: &TriMesh, dihedral: f64) -> Vec<bool> {
-    let normals = carried_normals(mesh);
+    let normals = robust_normals(mesh);
     let is_sharp = |h| {
         let twin = mesh.twin(h)?;
         let (a, b) = (normals[mesh.face(h).index()], normals[mesh.face(twin).index()]);
-        // The arc tangent is exact near flat and near folded, where the arc cosine is not.
+        // The arc tangent is accurate near 0 and π, the arc cosine is not.
         Some(a.cross(b).length().atan2(a.dot(b)) > dihedral)
     };
     mesh.edges().map(|e| is_sharp(mesh.halfedge(e)).unwrap_or(false)).collect()
 }
 
-/// The unit normal of each face; a thin face has that of the face it lies against, or zero if there is none.
-fn carried_normals(mesh: &TriMesh) -> Vec<DVec3> {
-    let carrier: Vec<FaceId> = mesh.faces().map(|f| carrier(mesh, f)).collect();
+/// The unit normal of each face; a thin face has that of its support. Zero if that is degenerate as well.
+fn robust_normals(mesh: &TriMesh) -> Vec<DVec3> {
+    let support: Vec<FaceId> = mesh.faces().map(|f| support(mesh, f)).collect();
     let normal = |mut f: FaceId| {
-        // Chains of thin faces are short; thin faces that lie against each other in a ring have no end.
-        const STEPS: usize = 64;
-        for _ in 0..STEPS {
-            if carrier[f.index()] == f {
+        // Longest chain of thin faces followed. Chains are short, except that thin faces may support each other in a
+        // cycle; then the last one's own normal is taken.
+        const MAX_CHAIN: usize = 64;
+        for _ in 0..MAX_CHAIN {
+            if support[f.index()] == f {
                 break;
             }
-            f = carrier[f.index()];
+            f = support[f.index()];
         }
         mesh.face_normal(f)
     };
@@ -52,42 +55,36 @@ fn carried_normals(mesh: &TriMesh) -> Vec<DVec3> {
 }
 
 /// The face itself, or if it is thin the neighbour across its longest edge.
-fn carrier(mesh: &TriMesh, f: FaceId) -> FaceId {
+fn support(mesh: &TriMesh, f: FaceId) -> FaceId {
     let sides = mesh.face_halfedges(f);
     let length = sides.map(|h| mesh.vector(h).length());
     let longest = (1..3).fold(0, |best, i| if length[i] > length[best] { i } else { best });
     let height = mesh.face_area_vector(f).length() / length[longest];
-    // A face of no extent at all has no height that compares.
-    if height >= THIN { f } else { mesh.twin(sides[longest]).map_or(f, |t| mesh.face(t)) }
+    // NaN for a face whose corners coincide: it counts as thin.
+    if height >= MIN_HEIGHT { f } else { mesh.twin(sides[longest]).map_or(f, |t| mesh.face(t)) }
 }
 
-/// Unmarks the sharp edges of every connected group shorter than `length` in all (in bounding-box diagonals).
-///
-/// On a scanned or organic surface single edges bend sharply by noise alone; a crease that is meant goes on.
+/// Unmarks every connected set of sharp edges whose total length is below `length` (in bounding-box diagonals): on scanned
+/// and organic surfaces single edges are sharp by noise alone, while intended creases are long.
 pub fn drop_short_features(mesh: &TriMesh, sharp: &mut [bool], length: f64) {
-    let mut group = vec![u32::MAX; mesh.n_edges()];
-    let mut members = Vec::new();
+    let mut search: BreadthFirst<EdgeId, ()> = BreadthFirst::new(mesh.n_edges());
     for seed in mesh.edges() {
-        if !sharp[seed.index()] || group[seed.index()] != u32::MAX {
+        let before = search.reached().len();
+        if !sharp[seed.index()] || !search.start(seed) {
             continue;
         }
-        members.clear();
-        members.push(seed);
-        group[seed.index()] = seed.0;
-        let mut next = 0;
-        while let Some(&e) = members.get(next) {
-            next += 1;
-            let spokes = mesh.edge_vertices(e).map(|v| mesh.outgoing(v));
-            // The last spoke of a boundary fan is left out here: it is a boundary edge and not sharp.
-            for f in spokes.into_iter().flatten().map(|h| mesh.edge(h)) {
-                if sharp[f.index()] && group[f.index()] == u32::MAX {
-                    group[f.index()] = seed.0;
-                    members.push(f);
+        while let Some(e) = search.visit() {
+            // The last edge of a boundary fan is left out: a boundary edge is not sharp.
+            for h in mesh.edge_vertices(e).into_iter().flat_map(|v| mesh.outgoing(v)) {
+                let next = mesh.edge(h);
+                if sharp[next.index()] {
+                    search.reach(next, ());
                 }
             }
         }
-        if members.iter().map(|&e| mesh.edge_length(e)).sum::<f64>() < length {
-            members.iter().for_each(|e| sharp[e.index()] = false);
+        let connected = &search.reached()[before..];
+        if connected.iter().map(|&e| mesh.edge_length(e)).sum::<f64>() < length {
+            connected.iter().for_each(|e| sharp[e.index()] = false);
         }
     }
 }
@@ -114,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_group_is_dropped_when_it_is_short_in_all() {
+    fn connected_features_are_dropped_by_total_length() {
         let mesh = parse(format!("{CUBE}f 1 2 6 5\n").as_bytes(), "cube.obj").unwrap().mesh;
         // The twelve edges are connected and 12 / √3 = 6.93 diagonals long.
         for (length, kept) in [(SHORT_FEATURE, 12), (6.9, 12), (7.0, 0)] {
@@ -125,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn slivers_make_no_false_features() {
+    fn slivers_have_no_sharp_edges_of_their_own() {
         // A flat square whose diagonal is split by vertices off the plane by rounding only.
         let flat = |z: f64| {
             format!(
@@ -135,7 +132,7 @@ mod tests {
             )
         };
         assert_eq!(count(&flat(1e-7), 20.0), 0);
-        // The cube's edge 1-2 with a sliver on it: the crease is found once, on the way along either side.
+        // The cube's edge 1-2 with a sliver on it: the crease is found once, along either side of the sliver.
         let sliver = format!("{CUBE}v 0.5 1e-7 -1e-7\nf 1 2 6 5\n").replace("f 4 3 2 1", "f 4 3 2 9 1\nf 1 9 2");
         let edges = count(&sliver, 40.0);
         assert!((12..=13).contains(&edges), "{edges}");

@@ -1,64 +1,18 @@
 //! The half-edge triangle mesh.
 //!
-//! Half-edge `3 f + i` runs along side `i` of face `f`, from its corner `i` to its corner `i + 1`. So face,
-//! next and previous are arithmetic, and only the origin and the twin are stored. A boundary half-edge has no
-//! twin. The mesh is an oriented manifold, checked once in [`TriMesh::from_faces`] and relied on everywhere.
-
-use std::fmt;
+//! Half-edge `3 f + i` runs along side `i` of face `f`, from its corner `i` to its corner `i + 1`. Hence face, next and
+//! previous half-edge are computed, and only origin and twin are stored. A boundary half-edge has no twin. The mesh is
+//! an oriented manifold; [`TriMesh::from_faces`] checks this once, and everything else relies on it.
 
 use glam::DVec3;
 use thiserror::Error;
 
-macro_rules! id {
-    ($(#[$doc:meta])* $name:ident) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-        #[serde(transparent)]
-        pub struct $name(pub u32);
-
-        impl $name {
-            /// The id of the element at `index` of a flat array.
-            #[inline]
-            pub fn new(index: usize) -> Self {
-                Self(index as u32)
-            }
-
-            /// The position of this element in flat arrays.
-            #[inline]
-            pub fn index(self) -> usize {
-                self.0 as usize
-            }
-        }
-
-        impl fmt::Debug for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "{}{}", stringify!($name).trim_end_matches("Id").to_lowercase(), self.0)
-            }
-        }
-    };
-}
-
-id!(
-    /// A vertex of a [`TriMesh`].
-    VertexId
-);
-id!(
-    /// A triangle of a [`TriMesh`].
-    FaceId
-);
-id!(
-    /// A directed side of a triangle of a [`TriMesh`].
-    HalfedgeId
-);
-id!(
-    /// An undirected edge of a [`TriMesh`].
-    EdgeId
-);
+use super::ids::{EdgeId, FaceId, HalfedgeId, VertexId};
 
 /// "No element" in the flat arrays of the kernel.
 const NONE: u32 = u32::MAX;
 
-/// Why a list of triangles is not an oriented manifold.
+/// Why a list of triangles is not an oriented manifold mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TriMeshError {
     /// A face names a vertex that does not exist.
@@ -79,7 +33,7 @@ pub enum TriMeshError {
         /// The vertex.
         vertex: u32,
     },
-    /// Two faces run along one edge in the same direction, or more than two faces share it.
+    /// Two faces use an edge in the same direction (inconsistent orientation), or more than two faces share it.
     #[error("edge {from}-{to} is used twice in the same direction (by faces {first} and {second})")]
     NonManifoldEdge {
         /// Start of the directed edge.
@@ -92,7 +46,7 @@ pub enum TriMeshError {
         second: usize,
     },
     /// The faces at a vertex form more than one fan.
-    #[error("vertex {vertex} joins several fans of faces")]
+    #[error("the faces at vertex {vertex} form more than one fan")]
     NonManifoldVertex {
         /// The vertex.
         vertex: u32,
@@ -121,22 +75,23 @@ pub struct TriMesh {
     twin: Vec<u32>,
     /// Undirected edge of each half-edge.
     edge: Vec<u32>,
-    /// One half-edge of each edge; the one with the smaller id.
+    /// One half-edge of each edge: that of smaller id.
     edge_halfedge: Vec<u32>,
-    /// One outgoing half-edge of each vertex; at the boundary the first one counter-clockwise.
+    /// One outgoing half-edge of each vertex; at a boundary vertex that without twin.
     vertex_halfedge: Vec<u32>,
 }
 
 impl TriMesh {
-    /// Connects `faces` (vertex indices, counter-clockwise from outside) over `positions`.
+    /// The mesh of `faces` (three vertex indices each, counter-clockwise seen from outside) over `positions`.
     ///
     /// # Errors
     ///
-    /// The first violation of "an oriented manifold, every vertex used, every coordinate finite".
+    /// The first violation of: every coordinate is finite, every face has three different known vertices, the faces form
+    /// an oriented manifold, every vertex has a face. See [`TriMeshError`].
     pub fn from_faces(positions: Vec<DVec3>, faces: &[[u32; 3]]) -> Result<Self, TriMeshError> {
         check_faces(&positions, faces)?;
         let origin: Vec<u32> = faces.iter().flatten().copied().collect();
-        let twin = connect(positions.len(), &origin)?;
+        let twin = find_twins(positions.len(), &origin)?;
 
         let mut edge = vec![NONE; origin.len()];
         let mut edge_halfedge = Vec::with_capacity(origin.len() / 2);
@@ -152,7 +107,7 @@ impl TriMesh {
 
         let mut vertex_halfedge = vec![NONE; positions.len()];
         for (h, &v) in origin.iter().enumerate() {
-            // Prefer the half-edge without twin: rotating counter-clockwise from it meets the whole fan.
+            // Prefer the half-edge without twin: turning counter-clockwise from it, one meets the whole fan.
             if vertex_halfedge[v as usize] == NONE || twin[h] == NONE {
                 vertex_halfedge[v as usize] = h as u32;
             }
@@ -162,6 +117,7 @@ impl TriMesh {
         Ok(mesh)
     }
 
+    /// Checks that every vertex has exactly one fan of faces.
     fn check_fans(&self) -> Result<(), TriMeshError> {
         let mut degree = vec![0u32; self.n_vertices()];
         for &v in &self.origin {
@@ -241,7 +197,7 @@ impl TriMesh {
         self.origin(self.next(h))
     }
 
-    /// The vertex of the triangle of `h` that is not on `h`.
+    /// The vertex of the triangle of `h` opposite to `h`.
     #[inline]
     pub fn opposite(&self, h: HalfedgeId) -> VertexId {
         self.origin(self.prev(h))
@@ -278,7 +234,7 @@ impl TriMesh {
         EdgeId(self.edge[h.index()])
     }
 
-    /// One half-edge of an edge: the one with the smaller id, hence the only one on the boundary.
+    /// The half-edge of smaller id of an edge; on the boundary its only one.
     #[inline]
     pub fn halfedge(&self, e: EdgeId) -> HalfedgeId {
         HalfedgeId(self.edge_halfedge[e.index()])
@@ -311,8 +267,8 @@ impl TriMesh {
 
     /// The outgoing half-edges of a vertex counter-clockwise, one per incident triangle.
     ///
-    /// At a boundary vertex the first is the boundary half-edge; the last spoke of the fan is an *incoming*
-    /// boundary half-edge and not listed.
+    /// At a boundary vertex the first one has no twin. The last edge of the fan has no outgoing half-edge and is left
+    /// out; [`Self::spokes`] has it.
     pub fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
         let first = self.vertex_halfedge(v);
         let mut next = Some(first);
@@ -335,13 +291,13 @@ impl TriMesh {
         self.twin(self.vertex_halfedge(v)).is_none()
     }
 
-    /// The boundary half-edge that leads to a boundary vertex; any incoming one elsewhere.
+    /// The half-edge without twin that ends at a boundary vertex; some incoming half-edge at an inner vertex.
     pub fn incoming_boundary(&self, v: VertexId) -> HalfedgeId {
         let last = self.outgoing(v).last();
         self.prev(last.unwrap_or(self.vertex_halfedge(v)))
     }
 
-    /// Moves a vertex; the connection of the mesh does not change.
+    /// Moves a vertex; the connectivity stays.
     pub(crate) fn set_position(&mut self, v: VertexId, position: DVec3) {
         self.positions[v.index()] = position;
     }
@@ -358,14 +314,19 @@ impl TriMesh {
         self.vector(self.halfedge(e)).length()
     }
 
-    /// Twice the area of a triangle times its unit normal.
+    /// Mean length of all edges; zero without edges.
+    pub fn mean_edge_length(&self) -> f64 {
+        self.edges().map(|e| self.edge_length(e)).sum::<f64>() / self.n_edges().max(1) as f64
+    }
+
+    /// The unit normal of a triangle times twice its area.
     #[inline]
     pub fn face_area_vector(&self, f: FaceId) -> DVec3 {
         let [a, b, c] = self.face_vertices(f).map(|v| self.position(v));
         (b - a).cross(c - a)
     }
 
-    /// Unit normal of a triangle; zero where the triangle is degenerate.
+    /// Unit normal of a triangle; zero if the triangle is degenerate.
     #[inline]
     pub fn face_normal(&self, f: FaceId) -> DVec3 {
         self.face_area_vector(f).normalize_or_zero()
@@ -391,6 +352,7 @@ impl TriMesh {
     }
 }
 
+/// Checks coordinates and vertex indices.
 fn check_faces(positions: &[DVec3], faces: &[[u32; 3]]) -> Result<(), TriMeshError> {
     if let Some(v) = positions.iter().position(|p| !p.is_finite()) {
         return Err(TriMeshError::NotFinite { vertex: v as u32 });
@@ -411,8 +373,9 @@ fn check_faces(positions: &[DVec3], faces: &[[u32; 3]]) -> Result<(), TriMeshErr
     Ok(())
 }
 
-/// Finds the twin of every half-edge, by sorting the half-edges at each vertex by their target.
-fn connect(n_vertices: usize, origin: &[u32]) -> Result<Vec<u32>, TriMeshError> {
+/// The twin of every half-edge, or `NONE`: half-edges are grouped by origin and sorted by target, so that the twin is
+/// found by bisection whatever the valence.
+fn find_twins(n_vertices: usize, origin: &[u32]) -> Result<Vec<u32>, TriMeshError> {
     let target = |h: usize| origin[if h % 3 == 2 { h - 2 } else { h + 1 }];
     let mut first = vec![0u32; n_vertices + 1];
     for &v in origin {
@@ -481,7 +444,7 @@ mod tests {
 
     #[test]
     fn a_vertex_may_have_any_valence() {
-        // A disc of 200 000 triangles round one vertex; anything quadratic in the valence would not end.
+        // A disc of 200 000 triangles around one vertex: time quadratic in the valence would not end.
         let n = 200_000u32;
         let rim = (0..n).map(|i| DVec3::new(f64::from(i).cos(), f64::from(i).sin(), 0.0));
         let faces: Vec<[u32; 3]> = (0..n).map(|i| [0, i + 1, (i + 1) % n + 1]).collect();
@@ -490,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_input_is_named() {
+    fn errors_name_what_is_not_a_manifold() {
         let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
         let err = |f: &[[u32; 3]]| TriMesh::from_faces(p.clone(), f).unwrap_err();
         assert!(matches!(err(&[[0, 1, 9]]), TriMeshError::UnknownVertex { vertex: 9, .. }));

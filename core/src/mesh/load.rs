@@ -1,17 +1,15 @@
-//! Opening a mesh file: read, cut into triangles, repair, normalise.
+//! Loading a mesh file: read, triangulate, repair, normalise.
 //!
-//! Afterwards the mesh is an oriented manifold (checked by [`TriMesh::from_faces`]) in a frame of its own, centred
-//! and of bounding-box diagonal 1, so that every tolerance of the program has one meaning. What had to be
-//! changed is listed; what cannot be repaired with certainty is refused with its place in the file.
+//! The result is an oriented manifold (checked by [`TriMesh::from_faces`]), centred and scaled to bounding-box diagonal 1,
+//! so that every tolerance of the library has one meaning. Repairs are listed. What cannot be repaired with certainty is
+//! an error that names its place in the file.
 
-use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::DVec3;
-use thiserror::Error;
-
-use super::kernel::{TriMesh, TriMeshError};
+use super::error::LoadError;
+use super::kernel::TriMesh;
+use super::normalisation::Normalisation;
 use super::read;
 use super::repair::{Repair, repair};
 use super::triangulate::triangulate;
@@ -22,199 +20,42 @@ use crate::progress::Progress;
 pub struct LoadedMesh {
     /// The mesh, centred at the origin and of bounding-box diagonal 1.
     pub mesh: Arc<TriMesh>,
-    /// The way back to the coordinates of the file.
+    /// The similarity that takes it back to the coordinates of the file.
     pub units: Normalisation,
-    /// What was changed to make it an oriented manifold, in the order done.
+    /// The repairs that made it an oriented manifold, in the order done.
     pub repairs: Vec<Repair>,
     /// The file's name without folder and extension.
     pub name: String,
 }
 
-/// The similarity between file coordinates and the normalised frame.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Normalisation {
-    /// Centre of the bounding box, in file units.
-    pub center: DVec3,
-    /// Diagonal of the bounding box: file units per normalised unit.
-    pub scale: f64,
-}
-
-impl Normalisation {
-    /// The frame in which `positions` have their bounding box centred and of diagonal 1; `None` where they have no
-    /// extent that floating point can express.
-    pub fn of(positions: &[DVec3]) -> Option<Self> {
-        let min = positions.iter().copied().reduce(DVec3::min)?;
-        let max = positions.iter().copied().reduce(DVec3::max)?;
-        let scale = (max - min).length();
-        let center = min + 0.5 * (max - min);
-        (scale.is_normal() && center.is_finite()).then_some(Self { center, scale })
-    }
-
-    /// From the normalised frame to file coordinates.
-    pub fn to_file(&self, p: DVec3) -> DVec3 {
-        p * self.scale + self.center
-    }
-
-    /// From file coordinates to the normalised frame.
-    pub fn from_file(&self, p: DVec3) -> DVec3 {
-        (p - self.center) / self.scale
-    }
-}
-
-/// A face as the file numbers it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FaceRef {
-    /// Its number, counted as the format does: from 1 in OBJ, from 0 elsewhere.
-    pub number: usize,
-    /// Its line, for text formats.
-    pub line: Option<usize>,
-}
-
-impl fmt::Display for FaceRef {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            Some(line) => write!(f, "face {} (line {line})", self.number),
-            None => write!(f, "face {}", self.number),
-        }
-    }
-}
-
-/// A vertex as the file numbers it, and where it lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VertexRef {
-    /// Its number, counted as the format does: from 1 in OBJ, from 0 elsewhere. Where vertices were welded by
-    /// position it is the number after welding.
-    pub number: usize,
-    /// Its position in file units.
-    pub position: DVec3,
-}
-
-impl fmt::Display for VertexRef {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let DVec3 { x, y, z } = self.position;
-        write!(f, "vertex {} at ({x}, {y}, {z})", self.number)
-    }
-}
-
-/// Why a file cannot be opened as a mesh.
-#[derive(Debug, Error)]
-pub enum LoadError {
-    /// The file cannot be read.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
-    /// No built-in model of this name.
-    #[error("there is no built-in model named “{0}”")]
-    UnknownModel(String),
-    /// A folder, a pipe or a device.
-    #[error("this is not a regular file")]
-    NotAFile,
-    /// There is nothing in the file.
-    #[error("the file is empty")]
-    Empty,
-    /// Neither content nor name tell a known format.
-    #[error("this is no mesh file that can be read (OBJ, OFF, PLY or STL)")]
-    UnknownFormat,
-    /// The text does not follow the format.
-    #[error("{}{message}", line.map(|l| format!("line {l}: ")).unwrap_or_default())]
-    Syntax {
-        /// The line, where there is one.
-        line: Option<usize>,
-        /// What is wrong.
-        message: String,
-    },
-    /// More elements than 32-bit ids can name.
-    #[error("the mesh is too large: more than a thousand million corners")]
-    TooLarge,
-    /// A coordinate is infinite or not a number.
-    #[error("vertex {vertex} has a coordinate that is not a finite number")]
-    NotFinite {
-        /// The vertex, as the file numbers it.
-        vertex: usize,
-    },
-    /// A face names a vertex that the file does not have.
-    #[error("{face} names vertex {vertex}, but there are only {count} vertices")]
-    UnknownVertex {
-        /// The face.
-        face: FaceRef,
-        /// The vertex, as the file numbers it.
-        vertex: usize,
-        /// The number of vertices.
-        count: usize,
-    },
-    /// A face has so many corners that it cannot be meant as one.
-    #[error("{face} has {corners} corners; more than {limit} are not supported")]
-    HugeFace {
-        /// The face.
-        face: FaceRef,
-        /// Its corners.
-        corners: usize,
-        /// The most corners a face may have.
-        limit: usize,
-    },
-    /// There is no face, or none that spans anything.
-    #[error("the file has no faces ({vertices} vertices)")]
-    NoFaces {
-        /// The number of vertices.
-        vertices: usize,
-    },
-    /// All vertices coincide, or are too far apart to be measured.
-    #[error("the mesh has no measurable size")]
-    NoSize,
-    /// More than two faces share an edge.
-    #[error("{count} faces share the edge from {from} to {to} (among them {first} and {second}); at most two may")]
-    NonManifoldEdge {
-        /// One end.
-        from: VertexRef,
-        /// The other end.
-        to: VertexRef,
-        /// How many faces share it.
-        count: usize,
-        /// The first of them.
-        first: FaceRef,
-        /// The second of them.
-        second: FaceRef,
-    },
-    /// A component has only one side, like a Moebius strip.
-    #[error("the surface has only one side, like a Möbius strip: it cannot be oriented at {face}, near {near}")]
-    NonOrientable {
-        /// A face where both orientations meet.
-        face: FaceRef,
-        /// A vertex of it.
-        near: VertexRef,
-    },
-    /// The repaired mesh is still not a manifold.
-    #[error("the mesh could not be repaired: {0}")]
-    Mesh(#[from] TriMeshError),
-}
-
-/// Opens a mesh file: OBJ, OFF, PLY or STL, told by its content.
+/// Loads a mesh file: OBJ, OFF, PLY or STL, recognised by its content.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or its content is refused; see [`LoadError`].
+/// [`LoadError`]: the file cannot be read, or its content is no mesh.
 pub fn load(path: &Path) -> Result<LoadedMesh, LoadError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    // Reading a pipe or a device might never end.
+    // Reading from a pipe or a device might never end.
     if !std::fs::metadata(path)?.is_file() {
         return Err(LoadError::NotAFile);
     }
     parse(&std::fs::read(path)?, &name)
 }
 
-/// Reads a mesh from the bytes of a file called `name`.
+/// Loads a mesh from the bytes of a file named `name`.
 ///
 /// # Errors
 ///
-/// The content is refused; see [`LoadError`].
+/// See [`LoadError`].
 pub fn parse(bytes: &[u8], name: &str) -> Result<LoadedMesh, LoadError> {
     parse_with(bytes, name, &Progress::new())
 }
 
-/// As [`parse`]; reports its stages.
+/// As [`parse`]; reports its stages to `progress`.
 ///
 /// # Errors
 ///
-/// The content is refused; see [`LoadError`].
+/// See [`LoadError`].
 pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<LoadedMesh, LoadError> {
     progress.report("Reading", 0.0);
     let raw = read::read(bytes, name)?;
@@ -262,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn real_meshes_have_the_topology_they_should() {
+    fn real_meshes_have_the_listed_topology() {
         let Some(folder) = meshes() else { return };
         for (file, genus, boundary_loops, components, manifold) in manifest(&folder) {
             let loaded = match load(&folder.join(&file)) {
@@ -283,7 +124,7 @@ mod tests {
                 assert!(matches!(loaded.repairs[0], Repair::SplitVertices { .. }), "{file}: {:?}", loaded.repairs);
             }
             let again = Normalisation::of(loaded.mesh.positions()).unwrap();
-            assert!((again.scale - 1.0).abs() < 1e-12 && again.center.length() < 1e-12);
+            assert!((again.scale - 1.0).abs() < 1e-12 && again.centre.length() < 1e-12);
         }
     }
 
@@ -297,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_content_tells_the_format() {
+    fn the_content_decides_the_format() {
         let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         assert_eq!(parse(off, "misnamed.obj").unwrap().mesh.n_faces(), 1);
         assert_eq!(parse(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "misnamed.ply").unwrap().name, "misnamed");
@@ -310,7 +151,7 @@ mod tests {
         assert_eq!((m.mesh.n_vertices(), &m.repairs[..]), (4, &[Repair::Welded { count: 2 }][..]));
     }
 
-    /// Pieces of all text formats, to come upon more than the first line of a reader by chance.
+    /// Text made of words of all formats, so that random input gets past the first line of a reader.
     fn mesh_like_text() -> impl Strategy<Value = String> {
         let word = prop_oneof![
             Just("v "),
@@ -364,9 +205,9 @@ mod tests {
             let _ = parse(text.as_bytes(), ["a.obj", "a.off", "a.ply", "a.stl"][ext]);
         }
 
-        /// Random triangles over few vertices: whatever loads is an oriented manifold with sound topology.
+        /// Random faces over few vertices: what loads satisfies the Euler formula.
         #[test]
-        fn random_faces_load_as_manifolds_or_not_at_all(
+        fn random_faces_load_as_manifolds_or_are_refused(
             faces in prop::collection::vec(prop::collection::vec(1u32..8, 3..6), 1..8),
         ) {
             let mut text: String = (0..7).map(|i| format!("v {} {} {}\n", i, (i * i) % 5, (i * 3) % 7)).collect();

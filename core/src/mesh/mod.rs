@@ -1,12 +1,15 @@
-//! Triangle meshes: the half-edge kernel, reading, checking and repair, topology, features.
+//! Triangle meshes: half-edge structure, loading and repair, topology, feature edges, traversals.
 //!
-//! The room for everything that is known of a surface before any geometry processing. Of this
-//! crate it may use nothing but `progress`.
+//! The first room after the numerics: everything about a surface that needs no geometry processing. Of this crate it uses
+//! `progress` and `union_find` only.
 
 mod builtin;
+mod error;
 mod features;
+mod ids;
 mod kernel;
 mod load;
+mod normalisation;
 mod read;
 mod repair;
 mod source;
@@ -17,9 +20,12 @@ mod triangulate;
 mod write;
 
 pub use builtin::{builtin, builtin_names};
+pub use error::{FaceRef, LoadError, VertexRef};
 pub use features::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edges};
-pub use kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, TriMeshError, VertexId};
-pub use load::{FaceRef, LoadError, LoadedMesh, Normalisation, VertexRef, load, parse, parse_with};
+pub use ids::{EdgeId, FaceId, HalfedgeId, VertexId};
+pub use kernel::{TriMesh, TriMeshError};
+pub use load::{LoadedMesh, load, parse, parse_with};
+pub use normalisation::Normalisation;
 pub use repair::Repair;
 pub use source::{MeshSource, fingerprint};
 pub use subdivide::loop_subdivision;

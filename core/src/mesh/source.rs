@@ -1,4 +1,4 @@
-//! Where the mesh of a document comes from, and how to notice that it has changed since.
+//! The source of a document's mesh, and a fingerprint that tells whether the mesh has changed since.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -6,16 +6,17 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::builtin::builtin;
+use super::error::LoadError;
 use super::kernel::TriMesh;
-use super::load::{LoadError, LoadedMesh, load};
+use super::load::{LoadedMesh, load};
 
-/// Where the mesh of a document comes from.
+/// Source of the mesh of a document.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshSource {
-    /// A model that comes with the program.
+    /// A built-in model, by name.
     Builtin(String),
-    /// A file.
+    /// A file; a relative path is relative to the folder of the document.
     File(PathBuf),
 }
 
@@ -29,7 +30,7 @@ impl MeshSource {
     ///
     /// # Errors
     ///
-    /// What reading says.
+    /// See [`LoadError`].
     pub fn load(&self, folder: &Path) -> Result<LoadedMesh, LoadError> {
         match self {
             Self::Builtin(name) => builtin(name).ok_or_else(|| LoadError::UnknownModel(name.clone())),
@@ -47,21 +48,21 @@ impl fmt::Display for MeshSource {
     }
 }
 
-/// A short text that changes with the connectivity or the shape of the mesh (FNV-1a over all of it).
+/// Numbers of vertices and faces, and a hash (64-bit FNV-1a) of connectivity and positions. Positions count rounded to
+/// 1e-6 of the units of `mesh`, so that a file with fewer digits has the same fingerprint.
 pub fn fingerprint(mesh: &TriMesh) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
-    let mut eat = |bytes: &[u8]| {
+    let mut add = |bytes: &[u8]| {
         for &b in bytes {
             hash = (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
         }
     };
     for h in mesh.halfedges() {
-        eat(&mesh.origin(h).0.to_le_bytes());
+        add(&mesh.origin(h).0.to_le_bytes());
     }
     for p in mesh.positions() {
-        // Rounded, so that a file read back with fewer digits is still the same mesh.
         for x in p.to_array() {
-            eat(&((x * 1e6).round() as i64).to_le_bytes());
+            add(&((x * 1e6).round() as i64).to_le_bytes());
         }
     }
     format!("{}-{}-{hash:016x}", mesh.n_vertices(), mesh.n_faces())

@@ -1,26 +1,27 @@
-//! Subdivision after Loop (1987): every triangle becomes four, and the surface smoother.
+//! Loop subdivision (Loop 1987): 1-to-4 refinement with smoothing.
 //!
-//! An edge's new vertex is 3/8 of its ends and 1/8 of the corners opposite; an old vertex moves towards the mean of
-//! its neighbours (weights of Warren). Along boundaries and creases the cubic spline of the curve stands instead;
-//! where a crease ends or several meet, the vertex stays.
+//! The new vertex of an edge is 3/8 of each end and 1/8 of each opposite corner. An old vertex moves towards the mean of its
+//! neighbours, with Warren's weights: 3/16 at valence 3, else 3/8 over the valence. Boundaries and creases are subdivided
+//! as cubic splines; vertices where more than two of these edges meet stay.
 
 use glam::DVec3;
 
-use super::kernel::{EdgeId, TriMesh, TriMeshError, VertexId};
+use super::ids::{EdgeId, VertexId};
+use super::kernel::{TriMesh, TriMeshError};
 
-/// The mesh with every triangle in four, smooth but along the edges marked in `crease` and on the boundary; and the
-/// halves of these creases, marked among the new edges.
+/// One step of Loop subdivision. `crease` has a flag per edge; boundary edges are creases in any case. Returned with the
+/// mesh are the flags of its edges: both halves of each marked edge are marked.
 ///
 /// # Errors
 ///
-/// More elements than ids can name.
+/// [`TriMeshError`] if the new positions are not finite.
 pub fn loop_subdivision(mesh: &TriMesh, crease: &[bool]) -> Result<(TriMesh, Vec<bool>), TriMeshError> {
-    let hard = |e: EdgeId| mesh.is_boundary_edge(e) || crease[e.index()];
-    let old = mesh.vertices().map(|v| moved(mesh, v, &hard));
+    let is_crease = |e: EdgeId| mesh.is_boundary_edge(e) || crease[e.index()];
+    let old = mesh.vertices().map(|v| moved_vertex(mesh, v, &is_crease));
     let new = mesh.edges().map(|e| {
         let [a, b] = mesh.edge_vertices(e).map(|v| mesh.position(v));
         let h = mesh.halfedge(e);
-        match mesh.twin(h).filter(|_| !hard(e)) {
+        match mesh.twin(h).filter(|_| !is_crease(e)) {
             None => 0.5 * (a + b),
             Some(t) => {
                 let [c, d] = [h, t].map(|h| mesh.position(mesh.opposite(h)));
@@ -39,7 +40,7 @@ pub fn loop_subdivision(mesh: &TriMesh, crease: &[bool]) -> Result<(TriMesh, Vec
     let fine = TriMesh::from_faces(old.chain(new).collect(), &faces)?;
     let n = mesh.n_vertices();
     let mark = |e: EdgeId| {
-        // A half of an old edge joins its new vertex with an old one; the new edges inside triangles do not.
+        // Half of an old edge joins an old vertex with a new one; edges inside old triangles join two new ones.
         let [a, b] = fine.edge_vertices(e).map(VertexId::index);
         let (low, high) = (a.min(b), a.max(b));
         low < n && crease[high - n]
@@ -48,31 +49,25 @@ pub fn loop_subdivision(mesh: &TriMesh, crease: &[bool]) -> Result<(TriMesh, Vec
     Ok((fine, marks))
 }
 
-fn moved(mesh: &TriMesh, v: VertexId, hard: &impl Fn(EdgeId) -> bool) -> DVec3 {
+/// The new position of an old vertex.
+fn moved_vertex(mesh: &TriMesh, v: VertexId, is_crease: &impl Fn(EdgeId) -> bool) -> DVec3 {
     let at = mesh.position(v);
-    let (mut sum, mut n, mut along, mut n_hard) = (DVec3::ZERO, 0.0, DVec3::ZERO, 0);
-    let mut add = |w: VertexId, e: EdgeId| {
+    let (mut sum, mut n, mut crease_sum, mut n_creases) = (DVec3::ZERO, 0.0, DVec3::ZERO, 0);
+    for (h, w) in mesh.spokes(v) {
         sum += mesh.position(w);
         n += 1.0;
-        if hard(e) {
-            along += mesh.position(w);
-            n_hard += 1;
-        }
-    };
-    for h in mesh.outgoing(v) {
-        add(mesh.target(h), mesh.edge(h));
-        // On the boundary the last edge has no half-edge that leaves `v`.
-        let back = mesh.prev(h);
-        if mesh.twin(back).is_none() {
-            add(mesh.origin(back), mesh.edge(back));
+        if is_crease(mesh.edge(h)) {
+            crease_sum += mesh.position(w);
+            n_creases += 1;
         }
     }
-    match n_hard {
+    match n_creases {
+        // Where a crease ends the vertex is smoothed as if there were none.
         0 | 1 => {
             let weight = if n == 3.0 { 3.0 / 16.0 } else { 3.0 / (8.0 * n) };
             at * (1.0 - n * weight) + sum * weight
         }
-        2 => 0.75 * at + 0.125 * along,
+        2 => 0.75 * at + 0.125 * crease_sum,
         _ => at,
     }
 }
@@ -83,7 +78,7 @@ mod tests {
     use crate::mesh::{SHARP_DIHEDRAL, Topology, builtin, sharp_edges};
 
     #[test]
-    fn topology_stays_and_triangles_become_four() {
+    fn subdivision_keeps_the_topology() {
         for name in ["pretzel", "sleeve"] {
             let mesh = builtin(name).unwrap().mesh;
             let (fine, _) = loop_subdivision(&mesh, &vec![false; mesh.n_edges()]).unwrap();

@@ -1,9 +1,11 @@
 //! Components, boundary loops, Euler characteristic and genus.
 //!
-//! Components are found by walking over edges. On an oriented component with `b` boundary loops
-//! `V − E + F = 2 − 2g − b` gives the genus `g`.
+//! Triangles that share an edge are of one component. On an oriented component with `b` boundary loops the genus `g`
+//! follows from the Euler characteristic: `V − E + F = 2 − 2g − b`.
 
-use super::kernel::{FaceId, HalfedgeId, TriMesh};
+use super::ids::{FaceId, HalfedgeId};
+use super::kernel::TriMesh;
+use super::traversal;
 
 /// The topology of a mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,7 +16,7 @@ pub struct Topology {
     pub component_of_face: Vec<u32>,
     /// The boundary loops: half-edges without twin, each ending where the next begins.
     pub boundary_loops: Vec<Vec<HalfedgeId>>,
-    /// Euler characteristic `V − E + F` of the whole.
+    /// Euler characteristic `V − E + F` of the whole mesh.
     pub euler: i64,
     /// Sum of the genera of all components.
     pub genus: usize,
@@ -31,7 +33,7 @@ pub struct Component {
     pub n_vertices: usize,
     /// Number of edges.
     pub n_edges: usize,
-    /// Its boundary loops, as positions in [`Topology::boundary_loops`].
+    /// Its boundary loops, as indices into [`Topology::boundary_loops`].
     pub boundary_loops: Vec<usize>,
 }
 
@@ -41,14 +43,14 @@ impl Component {
         self.n_vertices as i64 - self.n_edges as i64 + self.n_faces as i64
     }
 
-    /// The genus: the number of handles.
+    /// Genus: the number of handles.
     pub fn genus(&self) -> usize {
         ((2 - self.boundary_loops.len() as i64 - self.euler()) / 2).max(0) as usize
     }
 }
 
 impl Topology {
-    /// Analyses a mesh.
+    /// The topology of `mesh`.
     pub fn new(mesh: &TriMesh) -> Self {
         let (mut components, component_of_face) = components(mesh);
         let of = |h: HalfedgeId| component_of_face[mesh.face(h).index()] as usize;
@@ -67,32 +69,21 @@ impl Topology {
     }
 }
 
+/// The components with their faces counted, and the component of each face.
 fn components(mesh: &TriMesh) -> (Vec<Component>, Vec<u32>) {
-    let mut of_face = vec![u32::MAX; mesh.n_faces()];
-    let mut components = Vec::new();
-    let mut stack = Vec::new();
-    for first_face in mesh.faces() {
-        if of_face[first_face.index()] != u32::MAX {
-            continue;
-        }
-        let id = components.len() as u32;
-        let mut n_faces = 0;
-        of_face[first_face.index()] = id;
-        stack.push(first_face);
-        while let Some(f) = stack.pop() {
-            n_faces += 1;
-            for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|t| mesh.face(t)) {
-                if of_face[g.index()] == u32::MAX {
-                    of_face[g.index()] = id;
-                    stack.push(g);
-                }
-            }
-        }
-        components.push(Component { first_face, n_faces, n_vertices: 0, n_edges: 0, boundary_loops: Vec::new() });
+    let (of_face, count) = traversal::components(mesh.n_faces(), |f| mesh.adjacent_faces(f).map(|(_, g)| g));
+    let empty =
+        Component { first_face: FaceId(u32::MAX), n_faces: 0, n_vertices: 0, n_edges: 0, boundary_loops: Vec::new() };
+    let mut components = vec![empty; count];
+    for f in mesh.faces().rev() {
+        let component = &mut components[of_face[f.index()] as usize];
+        component.first_face = f;
+        component.n_faces += 1;
     }
     (components, of_face)
 }
 
+/// The half-edges without twin, chained to loops.
 fn boundary_loops(mesh: &TriMesh) -> Vec<Vec<HalfedgeId>> {
     let mut seen = vec![false; mesh.n_halfedges()];
     let mut loops = Vec::new();

@@ -20,7 +20,8 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-use super::kernel::{EdgeId, FaceId, HalfedgeId, TriMesh, VertexId};
+use super::ids::{EdgeId, FaceId, HalfedgeId, VertexId};
+use super::kernel::TriMesh;
 
 /// An element that flat arrays are indexed by.
 pub trait Element: Copy + Ord {

@@ -1,18 +1,17 @@
-//! Polygons to triangles.
+//! Triangulation of polygons.
 //!
-//! Ear clipping in the plane of the polygon's vector area, so that concave polygons stay inside their outline. Of
-//! the possible ears the one with the best triangle is cut first, and a diagonal that is already an edge of
-//! the mesh is avoided (two quads that share two sides would else both take the same diagonal). The result
-//! depends on nothing but the order of the file.
+//! Ears are clipped in the plane of the polygon's vector area, so that triangles of a concave polygon stay inside its
+//! outline. The ear with the best triangle is clipped first. Diagonals that are edges of the mesh already are avoided:
+//! two quads that share two sides would otherwise take the same diagonal, which four triangles would share.
 
 use std::collections::HashSet;
 
 use glam::{DVec2, DVec3};
 
-use super::load::LoadError;
+use super::error::LoadError;
 use super::read::RawMesh;
 
-/// Ear clipping is quadratic; beyond this many corners a face is a mistake rather than a face.
+/// Most corners of a polygon. Ear clipping takes quadratic time; chosen by hand, far above what files hold.
 const MAX_CORNERS: usize = 10_000;
 
 /// The triangles of a file, each with the polygon it comes from.
@@ -21,11 +20,11 @@ pub(super) struct Triangles {
     pub faces: Vec<[u32; 3]>,
     /// The polygon of each triangle.
     pub source: Vec<u32>,
-    /// Polygons that had fewer than three different corners.
+    /// Polygons of fewer than three different corners.
     pub dropped: Vec<u32>,
 }
 
-/// Cuts all polygons of a file into triangles.
+/// Triangulates all polygons of a file.
 pub(super) fn triangulate(raw: &RawMesh) -> Result<Triangles, LoadError> {
     let mut edges = Edges::of_polygons(raw);
     let mut out = Triangles::default();
@@ -52,7 +51,7 @@ pub(super) fn triangulate(raw: &RawMesh) -> Result<Triangles, LoadError> {
     Ok(out)
 }
 
-/// The edges there are already, kept only where diagonals are to be chosen.
+/// The edges of the mesh so far; empty if all polygons are triangles.
 struct Edges(HashSet<(u32, u32)>);
 
 impl Edges {
@@ -78,7 +77,7 @@ impl Edges {
     }
 }
 
-/// Cuts one polygon of at least four corners.
+/// Triangulates one polygon of at least four corners.
 fn clip_ears(outline: &mut Vec<u32>, positions: &[DVec3], edges: &mut Edges, faces: &mut Vec<[u32; 3]>) {
     let mut flat = flatten(outline, positions);
     let mut score: Vec<f64> = (0..outline.len()).map(|i| ear_score(&flat, outline, edges, i)).collect();
@@ -86,7 +85,7 @@ fn clip_ears(outline: &mut Vec<u32>, positions: &[DVec3], edges: &mut Edges, fac
         let n = outline.len();
         let mut best = best_of(&score);
         if score[best] <= 0.0 {
-            // Cutting ears elsewhere may have freed others.
+            // No ear is known: clipping elsewhere may have made some.
             score = (0..n).map(|i| ear_score(&flat, outline, edges, i)).collect();
             best = best_of(&score);
         }
@@ -104,12 +103,12 @@ fn clip_ears(outline: &mut Vec<u32>, positions: &[DVec3], edges: &mut Edges, fac
     faces.push([outline[0], outline[1], outline[2]]);
 }
 
-/// The first of the highest scores.
+/// Index of the first of the highest scores.
 fn best_of(score: &[f64]) -> usize {
     (1..score.len()).fold(0, |best, i| if score[i] > score[best] { i } else { best })
 }
 
-/// The polygon in the plane of its vector area, with positive area.
+/// The polygon projected to the plane of its vector area, with positive area there.
 fn flatten(outline: &[u32], positions: &[DVec3]) -> Vec<DVec2> {
     let at = |i: usize| positions[outline[i % outline.len()] as usize];
     let center = at(0);
@@ -119,8 +118,8 @@ fn flatten(outline: &[u32], positions: &[DVec3]) -> Vec<DVec2> {
     (0..outline.len()).map(|i| DVec2::new((at(i) - center).dot(u), (at(i) - center).dot(v))).collect()
 }
 
-/// How good it is to cut off corner `i`: from best to worst, an ear with a new diagonal (2 to 3), an ear whose
-/// diagonal is an edge already (1 to 2), a corner that is no ear (0 and below).
+/// Score of clipping corner `i`: 2 to 3 for an ear with a new diagonal, 1 to 2 for an ear whose diagonal is an edge
+/// already, at most 0 for a corner that is no ear. Within a class it is the quality of the triangle.
 fn ear_score(flat: &[DVec2], outline: &[u32], edges: &Edges, i: usize) -> f64 {
     let n = flat.len();
     let (before, after) = ((i + n - 1) % n, (i + 1) % n);
@@ -131,12 +130,12 @@ fn ear_score(flat: &[DVec2], outline: &[u32], edges: &Edges, i: usize) -> f64 {
     }
     let blocked = (0..n).any(|j| {
         let p = flat[j];
-        // A corner that repeats one of the ear's own does not lie inside it.
+        // A corner at the place of one of the ear's own does not lie inside it.
         ![before, i, after].contains(&j)
             && ![a, b, c].contains(&p)
             && [(a, b), (b, c), (c, a)].iter().all(|&(s, t)| (t - s).perp_dot(p - s) >= 0.0)
     });
-    // The last cut leaves a triangle too: of a quad both halves must be good.
+    // Of a quad both triangles count.
     let quality = if n == 4 { quality.min(self::quality(a, c, flat[(i + 2) % n])) } else { quality };
     match (blocked || quality <= 0.0, edges.contains(outline[before], outline[after])) {
         (true, _) => quality.min(0.0),
@@ -145,8 +144,7 @@ fn ear_score(flat: &[DVec2], outline: &[u32], edges: &Edges, i: usize) -> f64 {
     }
 }
 
-/// Twice the area over the sum of squared sides, times √3: 1 for an equilateral triangle, negative for a
-/// clockwise one.
+/// Shape quality of a triangle, `4 √3 area / Σ side²`: 1 if equilateral, 0 if degenerate, negative if clockwise.
 fn quality(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
     if sides > 0.0 { 2.0 * 3f64.sqrt() * (b - a).perp_dot(c - a) / sides } else { 0.0 }
@@ -166,7 +164,7 @@ mod tests {
         raw
     }
 
-    /// All triangles turn the right way and their areas add up: nothing lies outside the outline.
+    /// Checks that all triangles have positive area and that the areas add up to that of the polygon.
     fn check_inside(raw: &RawMesh, area: f64) {
         let out = triangulate(raw).unwrap();
         let p = |v: u32| raw.positions[v as usize].truncate();

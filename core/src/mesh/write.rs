@@ -1,19 +1,19 @@
 //! Writing meshes as Wavefront OBJ.
 //!
-//! Coordinates are written with as many digits as it takes to read back the same number.
+//! Coordinates have as many digits as needed to read back the same number.
 
 use std::io::{self, Write};
 
 use glam::DVec3;
 
 use super::kernel::TriMesh;
-use super::load::Normalisation;
+use super::normalisation::Normalisation;
 
 /// Writes polygons (vertex indices from 0) over `positions` (in file units) as OBJ.
 ///
 /// # Errors
 ///
-/// `out` cannot be written.
+/// Those of writing to `out`.
 pub fn write_obj<P: AsRef<[u32]>>(out: &mut impl Write, positions: &[DVec3], polygons: &[P]) -> io::Result<()> {
     for DVec3 { x, y, z } in positions {
         writeln!(out, "v {x} {y} {z}")?;
@@ -28,11 +28,11 @@ pub fn write_obj<P: AsRef<[u32]>>(out: &mut impl Write, positions: &[DVec3], pol
     Ok(())
 }
 
-/// Writes a triangle mesh in the coordinates of its file as OBJ.
+/// Writes a normalised triangle mesh as OBJ, in the coordinates of its file.
 ///
 /// # Errors
 ///
-/// `out` cannot be written.
+/// Those of writing to `out`.
 pub fn write_mesh_obj(out: &mut impl Write, mesh: &TriMesh, units: &Normalisation) -> io::Result<()> {
     let positions: Vec<DVec3> = mesh.positions().iter().map(|&p| units.to_file(p)).collect();
     let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
@@ -45,7 +45,7 @@ mod tests {
     use crate::mesh::parse;
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn written_meshes_read_back_equal() {
         let positions = [DVec3::ZERO, DVec3::X / 3.0, DVec3::new(1.0 / 3.0, 0.1, 1e-9), DVec3::Y * 0.7];
         let mut bytes = Vec::new();
         write_obj(&mut bytes, &positions, &[[0u32, 1, 2, 3]]).unwrap();

@@ -353,7 +353,7 @@ proptest! {
     ) {
         let mesh = perturbed(&octasphere(n), amount, seed);
         let metric = Metric::new(&mesh);
-        let field = shape_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+        let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
         let mut system = SeamlessSystem::new(&mesh, &field, &nodes(&field), &[]).unwrap();
         let plain = solved(&mut system, &metric, &field).map;
         check_transitions(&mesh, &field, &plain);

@@ -1,11 +1,11 @@
-//! A half-edge mesh whose connection may change: the layout of [`TriMesh`], with edge collapses and flips.
+//! A half-edge mesh with edge collapses and flips, in the memory layout of [`TriMesh`].
 //!
-//! Half-edge `3 f + i` runs along side `i` of face `f`. A face that is gone has no origins, a vertex that is gone no
-//! spoke. Vertices keep the ids of the mesh that was started from.
+//! Half-edge `3 f + i` is side `i` of face `f`. The half-edges of a removed face have the origin [`NONE`]; a removed
+//! vertex has the spoke [`NONE`]. Vertices keep the ids of the original mesh.
 
 use crate::mesh::TriMesh;
 
-/// "No element" in flat arrays.
+/// No element, in arrays of ids.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// The next half-edge around the triangle.
@@ -26,7 +26,7 @@ pub(super) struct Connectivity {
     twin: Vec<u32>,
     /// Whether a half-edge lies on a feature.
     feature: Vec<bool>,
-    /// One outgoing half-edge of each vertex, the boundary one if there is one.
+    /// One outgoing half-edge of each vertex, on the boundary if the vertex is.
     spoke: Vec<u32>,
     /// Number of edges at each vertex.
     degree: Vec<u32>,
@@ -34,7 +34,7 @@ pub(super) struct Connectivity {
 }
 
 impl Connectivity {
-    /// A copy of `mesh` with these edges as features.
+    /// A copy of `mesh`; `sharp` has a flag for each edge that is a feature.
     pub fn new(mesh: &TriMesh, sharp: &[bool]) -> Self {
         let mut degree = vec![0; mesh.n_vertices()];
         for e in mesh.edges() {
@@ -50,40 +50,40 @@ impl Connectivity {
         }
     }
 
-    /// Number of faces left.
+    /// Number of remaining faces.
     pub fn n_faces(&self) -> usize {
         self.n_faces
     }
 
-    /// Number of half-edges ever.
+    /// Number of half-edges, those of removed faces included.
     pub fn n_halfedges(&self) -> usize {
         self.origin.len()
     }
 
-    /// Whether the face of a half-edge is still there.
+    /// Whether the face of a half-edge remains.
     #[inline]
     pub fn has(&self, h: u32) -> bool {
         self.origin[h as usize] != NONE
     }
 
-    /// Whether a vertex is still there.
+    /// Whether a vertex remains.
     #[inline]
     pub fn has_vertex(&self, v: u32) -> bool {
         self.spoke[v as usize] != NONE
     }
 
-    /// One outgoing half-edge of a vertex that is still there.
+    /// One outgoing half-edge of a remaining vertex.
     pub fn spoke(&self, v: u32) -> u32 {
         self.spoke[v as usize]
     }
 
-    /// The start of a half-edge.
+    /// The vertex at the start of a half-edge.
     #[inline]
     pub fn origin(&self, h: u32) -> u32 {
         self.origin[h as usize]
     }
 
-    /// The end of a half-edge.
+    /// The vertex at the end of a half-edge.
     #[inline]
     pub fn target(&self, h: u32) -> u32 {
         self.origin[next(h) as usize]
@@ -145,10 +145,10 @@ impl Connectivity {
         self.degree[v as usize] as usize
     }
 
-    /// Collapses the edge from `a` to `b` into `b`, given all `spokes` of `a` and the one or two faces at the edge.
-    /// The link condition holds.
+    /// Collapses the edge from `a` to `b` to the vertex `b`. `spokes` are all outgoing half-edges of `a`. The link
+    /// condition must hold.
     pub fn collapse(&mut self, spokes: &[u32], a: u32, b: u32) {
-        // The edge itself goes, and of each pair that meets at a third corner one.
+        // The edge itself is removed, and below one edge of each pair that becomes one.
         self.degree[b as usize] += self.degree[a as usize];
         self.degree[b as usize] -= 2;
         for &h in spokes {
@@ -156,7 +156,7 @@ impl Connectivity {
         }
         for &h in spokes {
             let f = h - h % 3;
-            // The face has `b` twice where it was at the edge: once as `a`.
+            // A face at the collapsed edge now has `b` as two of its corners; it is removed.
             let sides = [f, f + 1, f + 2];
             let Some(&loop_side) = sides.iter().find(|&&s| self.origin(s) == b && self.target(s) == b) else {
                 continue;
@@ -172,10 +172,10 @@ impl Connectivity {
                     self.feature[s as usize] = feature;
                 }
             }
-            // `x` runs from `c` to `b`, `y` from `b` to `c`: whichever is left serves as spoke of its origin.
+            // `x` goes from `c` to `b`, `y` from `b` to `c`: the remaining ones may become spokes of their origins.
             for v in [b, c] {
-                let gone = self.spoke[v as usize];
-                if gone != NONE && gone - gone % 3 == f {
+                let spoke = self.spoke[v as usize];
+                if spoke != NONE && spoke - spoke % 3 == f {
                     self.spoke[v as usize] = NONE;
                 }
             }
@@ -192,11 +192,11 @@ impl Connectivity {
             self.n_faces -= 1;
         }
         self.spoke[a as usize] = NONE;
-        self.mend_spokes(spokes, b);
+        self.restore_spokes(spokes, b);
     }
 
-    /// Finds spokes for `b` and its neighbours that lost theirs, and the boundary spoke of `b`.
-    fn mend_spokes(&mut self, spokes: &[u32], b: u32) {
+    /// Sets the spokes of `b` and its neighbours where they were in a removed face, and the boundary spoke of `b`.
+    fn restore_spokes(&mut self, spokes: &[u32], b: u32) {
         for &h in spokes.iter().filter(|&&h| self.origin[h as usize] != NONE) {
             let out = prev(h);
             for s in [h, next(h), out] {
@@ -209,9 +209,9 @@ impl Connectivity {
         debug_assert!(self.spoke[b as usize] != NONE);
     }
 
-    /// Turns the inner edge of `h` from `a b` to `d c` within its two triangles `a b c` and `b a d`.
+    /// Flips the inner edge of `h`, from `a b` to `d c` in its two triangles `a b c` and `b a d`.
     ///
-    /// The face of `h` becomes `c a d`, that of its twin `d b c`, each starting with the corner named first.
+    /// The face of `h` becomes `c a d`, that of its twin `d b c`, with their corners in this order.
     pub fn flip(&mut self, h: u32) {
         let g = self.twin[h as usize];
         let (a, b) = (self.origin(h), self.origin(g));
@@ -220,7 +220,7 @@ impl Connectivity {
         for (v, change) in [(a, -1), (b, -1), (c, 1), (d, 1)] {
             self.degree[v as usize] = self.degree[v as usize].wrapping_add_signed(change);
         }
-        // Old outer sides: b c, c a, a d, d b, with twin and feature; and where they go.
+        // The outer sides b c, c a, a d, d b: their twins and feature flags, and their new half-edges.
         let old = [next(h), prev(h), next(g), prev(g)].map(|s| (self.twin[s as usize], self.feature[s as usize]));
         let new = [e + 1, f, f + 1, e];
         for (s, v) in [(f, c), (f + 1, a), (f + 2, d), (e, d), (e + 1, b), (e + 2, c)] {
@@ -232,7 +232,7 @@ impl Connectivity {
             if t != NONE {
                 self.twin[t as usize] = s;
             }
-            // Each of the four corners starts one outer side.
+            // Each of the four corners is the origin of one outer side.
             let v = self.origin[s as usize] as usize;
             let was = self.spoke[v] - self.spoke[v] % 3;
             if was == f || was == e || t == NONE {
@@ -243,7 +243,7 @@ impl Connectivity {
         (self.feature[f as usize + 2], self.feature[e as usize + 2]) = (false, false);
     }
 
-    /// Puts vertex `w` in the place of vertex `v`, whose spokes are given.
+    /// Replaces vertex `v` by vertex `w`; `spokes` are all outgoing half-edges of `v`.
     pub fn replace(&mut self, spokes: &[u32], v: u32, w: u32) {
         for &h in spokes {
             self.origin[h as usize] = w;

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-/// A weighted sum of squared distances to planes, as a symmetric 4×4 form, and the sum of the weights.
+/// A weighted sum of squared distances from planes, as a symmetric 4×4 form, and the sum of the weights.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Quadric {
-    /// `xx, xy, xz, yy, yz, zz`.
+    /// Quadratic coefficients `xx, xy, xz, yy, yz, zz`.
     square: [f64; 6],
     linear: DVec3,
     constant: f64,
@@ -13,19 +13,20 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// The plane through `point` with unit `normal`; `share` is what it counts in the mean.
-    pub fn plane(normal: DVec3, point: DVec3, weight: f64, share: f64) -> Self {
+    /// The plane through `point` with unit `normal`. `weight` multiplies the squared distance; `mean_weight` is what
+    /// the plane adds to the denominator of the mean.
+    pub fn plane(normal: DVec3, point: DVec3, weight: f64, mean_weight: f64) -> Self {
         let d = -normal.dot(point);
         let DVec3 { x, y, z } = normal;
         Self {
             square: [x * x, x * y, x * z, y * y, y * z, z * z].map(|a| a * weight),
             linear: normal * (d * weight),
             constant: d * d * weight,
-            weight: share,
+            weight: mean_weight,
         }
     }
 
-    /// Adds another.
+    /// Adds another quadric.
     pub fn add(&mut self, other: &Self) {
         for (a, b) in self.square.iter_mut().zip(other.square) {
             *a += b;
@@ -35,6 +36,7 @@ impl Quadric {
         self.weight += other.weight;
     }
 
+    /// Weighted sum of squared distances of `p`.
     fn sum(&self, p: DVec3) -> f64 {
         let [xx, xy, xz, yy, yz, zz] = self.square;
         let DVec3 { x, y, z } = p;
@@ -42,7 +44,7 @@ impl Quadric {
         square + 2.0 * self.linear.dot(p) + self.constant
     }
 
-    /// Mean squared distance of `p` to the planes of two quadrics together, not below 0.
+    /// Mean squared distance of `p` from the planes of two quadrics together, not negative.
     pub fn mean_of_two(&self, other: &Self, p: DVec3) -> f64 {
         ((self.sum(p) + other.sum(p)) / (self.weight + other.weight).max(f64::MIN_POSITIVE)).max(0.0)
     }
@@ -53,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_measures_distances_to_planes() {
+    fn a_quadric_is_the_mean_squared_distance_from_its_planes() {
         let mut q = Quadric::plane(DVec3::Z, DVec3::new(0.3, 0.1, 0.5), 2.0, 2.0);
         let p = DVec3::new(4.0, -1.0, 0.8);
         assert!((q.mean_of_two(&Quadric::default(), p) - 0.09).abs() < 1e-14);

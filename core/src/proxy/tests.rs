@@ -1,18 +1,24 @@
-//! Tests of the simplification and the map.
+//! Tests of the simplification, the map and the transfer of curves.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use glam::DVec3;
+use proptest::prelude::*;
 
-use super::shape::{Kind, kinds, roundness};
-use super::*;
+use super::build::ProxyError;
+use super::collapse::Simplifier;
+use super::map::Proxy;
+use super::triangle_shape::{equilateral_length, roundness};
+use super::vertex_kinds::{VertexKind, vertex_kinds, vertex_normals};
 use crate::mesh::{
-    FaceId, HalfedgeId, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, VertexId, builtin, drop_short_features, sharp_edges,
+    FaceId, HalfedgeId, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, builtin, drop_short_features,
+    sharp_edges,
 };
+use crate::progress::{Cancelled, Progress};
 use crate::surface::testing::{Random, dual_cycle, real_mesh};
 use crate::surface::{Crossing, RelaxOptions, SurfaceCurve, SurfaceIndex, SurfacePoint, relax};
-use crate::testing::{column, grid, square, torus};
+use crate::testing::{column, grid, row, square, torus};
 
 fn features(mesh: &TriMesh) -> Vec<bool> {
     let mut sharp = sharp_edges(mesh, SHARP_DIHEDRAL);
@@ -20,12 +26,12 @@ fn features(mesh: &TriMesh) -> Vec<bool> {
     sharp
 }
 
-/// Topology as numbers that must stay: components, genus and boundary loops of each.
+/// Genus and number of boundary loops of each component.
 fn topology(mesh: &TriMesh) -> Vec<(usize, usize)> {
     Topology::new(mesh).components.iter().map(|c| (c.genus(), c.boundary_loops.len())).collect()
 }
 
-/// A proxy of which all is checked that holds for any.
+/// A proxy, after checks of the properties that every proxy has.
 fn proxy_of(mesh: &TriMesh, target: usize) -> Proxy {
     let sharp = features(mesh);
     let proxy = Proxy::new(mesh, &sharp, target, &Progress::new()).unwrap();
@@ -33,16 +39,16 @@ fn proxy_of(mesh: &TriMesh, target: usize) -> Proxy {
     assert_eq!(topology(mesh), topology(q));
     for v in q.vertices() {
         let o = proxy.original_vertex(v);
-        assert_eq!((q.position(v), proxy.places()[o.index()]), (mesh.position(o), mesh.position(o)));
+        assert_eq!((q.position(v), proxy.image_positions()[o.index()]), (mesh.position(o), mesh.position(o)));
     }
     let kept: Vec<VertexId> = q.vertices().map(|v| proxy.original_vertex(v)).collect();
-    let kinds = kinds(mesh, &sharp);
+    let kinds = vertex_kinds(mesh, &sharp);
     for v in mesh.vertices() {
-        if kinds[v.index()] == Kind::Corner {
-            assert!(kept.binary_search(&v).is_ok(), "corner {v:?} is gone");
+        if kinds[v.index()] == VertexKind::Corner {
+            assert!(kept.binary_search(&v).is_ok(), "corner {v:?} was removed");
         }
-        if kinds[v.index()] == Kind::Crease {
-            // What was on a crease is on one: on an edge that is a feature or boundary.
+        if kinds[v.index()] == VertexKind::Crease {
+            // The image of a crease vertex is on an edge that is a feature or boundary.
             let p = proxy.image(v);
             let sides = q.face_halfedges(p.face);
             let on = |i: usize| q.twin(sides[i]).is_none() || proxy.sharp()[q.edge(sides[i]).index()];
@@ -53,13 +59,13 @@ fn proxy_of(mesh: &TriMesh, target: usize) -> Proxy {
     proxy
 }
 
-/// Largest distance from the original's vertices to the proxy and back from the proxy's centers.
+/// Largest distance of the original's vertices from the proxy and of the proxy's triangle centres from the original.
 fn hausdorff(mesh: &TriMesh, proxy: &Proxy) -> f64 {
     let q = proxy.mesh();
     let (there, back) = (SurfaceIndex::new(q), SurfaceIndex::new(mesh));
     let out = mesh.positions().iter().map(|&p| there.nearest(p).position(q).distance(p));
-    let center = |face| SurfacePoint { face, weights: [1.0 / 3.0; 3] }.position(q);
-    let home = q.faces().map(|f| back.nearest(center(f)).position(mesh).distance(center(f)));
+    let centre = |face| SurfacePoint { face, weights: [1.0 / 3.0; 3] }.position(q);
+    let home = q.faces().map(|f| back.nearest(centre(f)).position(mesh).distance(centre(f)));
     out.chain(home).fold(0.0, f64::max)
 }
 
@@ -76,7 +82,7 @@ fn shape_statistics(mesh: &TriMesh) -> (f64, f64) {
 }
 
 #[test]
-fn built_in_models_keep_topology_and_get_even_triangles() {
+fn built_in_models_keep_their_topology_and_get_triangles_of_even_size() {
     for (name, target) in [("pretzel", 1600), ("sleeve", 1200), ("rounded-cube", 1500), ("creature", 2500)] {
         let mesh = builtin(name).unwrap().mesh;
         let proxy = proxy_of(&mesh, target);
@@ -90,12 +96,12 @@ fn built_in_models_keep_topology_and_get_even_triangles() {
 }
 
 #[test]
-fn degrees_and_spokes_are_kept_up() {
+fn degrees_and_spokes_stay_correct() {
     for name in ["pretzel", "sleeve"] {
         let mesh = builtin(name).unwrap().mesh;
         let sharp = features(&mesh);
-        let (kinds, normals) = (kinds(&mesh, &sharp), shape::vertex_normals(&mesh));
-        let mut work = Simplifier::new(&mesh, &sharp, kinds, &normals, shape::even_length(&mesh, 1500));
+        let (kinds, normals) = (vertex_kinds(&mesh, &sharp), vertex_normals(&mesh));
+        let mut work = Simplifier::new(&mesh, &sharp, kinds, &normals, equilateral_length(&mesh, 1500));
         work.reduce(1500, &Progress::new()).unwrap();
         work.improve(2, &Progress::new()).unwrap();
         for v in (0..mesh.n_vertices() as u32).filter(|&v| work.mesh.has_vertex(v)) {
@@ -111,11 +117,11 @@ fn a_small_mesh_is_its_own_proxy() {
     let mesh = torus(20, 10);
     let proxy = proxy_of(&mesh, 1000);
     assert_eq!(proxy.mesh().n_faces(), mesh.n_faces());
-    assert!(mesh.vertices().all(|v| proxy.places()[v.index()] == mesh.position(v)));
+    assert!(mesh.vertices().all(|v| proxy.image_positions()[v.index()] == mesh.position(v)));
 }
 
 #[test]
-fn a_crease_and_a_boundary_stay_straight() {
+fn a_straight_crease_and_boundary_stay_straight() {
     let roof = grid(60, 60, [false, false], |u, v| DVec3::new(u, v, 0.6 - (u - 0.5).abs()) / 1.6);
     let proxy = proxy_of(&roof, 800);
     let q = proxy.mesh();
@@ -126,7 +132,7 @@ fn a_crease_and_a_boundary_stay_straight() {
 }
 
 #[test]
-fn it_reports_wrong_features_and_stops_when_told() {
+fn a_wrong_number_of_flags_and_cancellation_are_errors() {
     let mesh = square(10);
     let progress = Progress::new();
     let wrong = Proxy::new(&mesh, &[], 50, &progress).err();
@@ -137,21 +143,22 @@ fn it_reports_wrong_features_and_stops_when_told() {
 }
 
 #[test]
-fn what_cannot_shrink_stays() {
-    // A tetrahedron has nothing to spare, nor has a single triangle.
+fn a_mesh_that_cannot_be_simplified_is_kept() {
+    // No edge of a tetrahedron or of a single triangle can be collapsed.
     let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     let smooth = |mesh: &TriMesh| Proxy::new(mesh, &vec![false; mesh.n_edges()], 1, &Progress::new()).unwrap();
     let tetrahedron = TriMesh::from_faces(p.to_vec(), &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).unwrap();
     assert_eq!(smooth(&tetrahedron).mesh().n_faces(), 4);
     let triangle = TriMesh::from_faces(p[..3].to_vec(), &[[0, 1, 2]]).unwrap();
     assert_eq!(smooth(&triangle).mesh().n_faces(), 1);
-    // Asked for the impossible, a torus is still a torus.
+    // A target that cannot be reached leaves the topology unchanged.
     let small = smooth(&torus(40, 20));
     assert_eq!(topology(small.mesh()), [(1, 0)]);
     assert!(small.mesh().n_faces() < 300);
 }
 
-/// Distances after going to and fro from both sides, in mean edges of the proxy: the largest of each.
+/// Largest distance of a point from its round trip, from the original to the proxy and back and the other way round, in
+/// mean edges of the proxy.
 fn round_trips(mesh: &TriMesh, proxy: &Proxy) -> (f64, f64) {
     let q = proxy.mesh();
     let point = |face| SurfacePoint { face, weights: [0.2, 0.3, 0.5] };
@@ -167,7 +174,7 @@ fn round_trips(mesh: &TriMesh, proxy: &Proxy) -> (f64, f64) {
 }
 
 #[test]
-fn points_come_back() {
+fn points_return_from_a_round_trip() {
     for (name, target) in [("pretzel", 1600), ("sleeve", 1200)] {
         let mesh = builtin(name).unwrap().mesh;
         let proxy = proxy_of(&mesh, target);
@@ -208,8 +215,8 @@ fn on_a_thin_plate_points_stay_on_their_sheet() {
     }
 }
 
-/// Algebraic number of intersections of two closed curves, by the order of their ends around each triangle. The second
-/// is moved a little along all edges, as crossings kept off a vertex may coincide.
+/// Algebraic intersection number of two closed curves, from the order of their ends around each triangle. The second
+/// curve is displaced a little along all edges, since crossings kept off a vertex may coincide.
 fn intersections(mesh: &TriMesh, a: &SurfaceCurve, b: &SurfaceCurve) -> i64 {
     let segments = |curve: &SurfaceCurve, nudge: f64| -> Vec<(FaceId, f64, f64)> {
         let n = curve.crossings.len();
@@ -238,8 +245,8 @@ fn intersections(mesh: &TriMesh, a: &SurfaceCurve, b: &SurfaceCurve) -> i64 {
     sum
 }
 
-/// Relaxed random cycles of the proxy and what they become on the original.
-fn carried_cycles(mesh: &TriMesh, proxy: &Proxy, count: usize) -> Vec<(SurfaceCurve, SurfaceCurve)> {
+/// Relaxed random cycles on the proxy and their counterparts on the original.
+fn transferred_cycles(mesh: &TriMesh, proxy: &Proxy, count: usize) -> Vec<(SurfaceCurve, SurfaceCurve)> {
     let q = proxy.mesh();
     let mut random = Random(5);
     let mut list = Vec::new();
@@ -255,11 +262,11 @@ fn carried_cycles(mesh: &TriMesh, proxy: &Proxy, count: usize) -> Vec<(SurfaceCu
 }
 
 #[test]
-fn carried_cycles_keep_length_and_intersection_numbers() {
+fn transferred_cycles_keep_length_and_intersection_numbers() {
     for (mesh, target) in [(Arc::new(torus(150, 60)), 2500), (builtin("pretzel").unwrap().mesh, 1600)] {
         let proxy = proxy_of(&mesh, target);
         // Random cycles are mostly contractible; plane sections go around handles.
-        let mut cycles = carried_cycles(&mesh, &proxy, 10);
+        let mut cycles = transferred_cycles(&mesh, &proxy, 10);
         for normal in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.5, -0.6, 0.2)] {
             let middle = mesh.positions().iter().sum::<DVec3>() / mesh.n_vertices() as f64;
             for curve in sections(proxy.mesh(), normal, middle.dot(normal) + 0.0123) {
@@ -280,6 +287,51 @@ fn carried_cycles_keep_length_and_intersection_numbers() {
             }
         }
         assert!(crossing > 10, "{crossing}");
+    }
+}
+
+static TORUS: LazyLock<(TriMesh, Proxy)> = LazyLock::new(|| {
+    let mesh = torus(120, 48);
+    let proxy = proxy_of(&mesh, 2500);
+    (mesh, proxy)
+});
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// A curve of the original, transferred to the proxy and back, is closed and valid and has the same homology class,
+    /// told by its intersection numbers with a row and a column.
+    #[test]
+    fn a_curve_keeps_its_class_to_the_proxy_and_back(
+        normal in prop::array::uniform3(-1.0f64..1.0).prop_map(DVec3::from_array),
+        offset in -0.3f64..0.3,
+    ) {
+        let (mesh, proxy) = &*TORUS;
+        prop_assume!(normal.length() > 0.1);
+        let generators = [row(120, 3, true, 0.37), column(120, 48, 5, true, 0.61)];
+        let class = |curve: &SurfaceCurve| generators.clone().map(|g| intersections(mesh, curve, &g));
+        for curve in sections(mesh, normal.normalize(), offset) {
+            // Curves around less than a few triangles of the proxy have no counterpart there.
+            if curve.length(mesh) < 20.0 * mean_edge(proxy.mesh()) {
+                continue;
+            }
+            let there = proxy.curve_to_proxy(mesh, &curve).unwrap();
+            prop_assert_eq!((there.check(proxy.mesh()), there.closed), (Ok(()), true));
+            let back = proxy.curve_to_original(mesh, &there).unwrap();
+            prop_assert_eq!((back.check(mesh), back.closed), (Ok(()), true));
+            prop_assert_eq!(class(&back), class(&curve));
+            prop_assert!((back.length(mesh) / curve.length(mesh) - 1.0).abs() < 0.15);
+        }
+    }
+
+    /// The image of a point on the proxy, mapped back, is near the point.
+    #[test]
+    fn a_point_returns_from_the_proxy(face in 0u32..120 * 48 * 2, u in 0.0f64..1.0, v in 0.0f64..1.0) {
+        let (mesh, proxy) = &*TORUS;
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        let point = SurfacePoint { face: FaceId(face), weights: [1.0 - u - v, u, v] };
+        let back = proxy.to_original(mesh, proxy.to_proxy(mesh, point));
+        prop_assert!(back.position(mesh).distance(point.position(mesh)) < 0.15 * mean_edge(proxy.mesh()));
     }
 }
 
@@ -309,7 +361,7 @@ fn sections(mesh: &TriMesh, normal: DVec3, offset: f64) -> Vec<SurfaceCurve> {
 }
 
 #[test]
-fn smoothing_takes_away_relief_and_keeps_shape_and_map() {
+fn smoothing_removes_relief_and_keeps_shape_and_map() {
     let (big, small) = (0.3, 0.1);
     // A torus with ripples of a wavelength of 0.03.
     let rippled = |height: f64| {
@@ -328,18 +380,18 @@ fn smoothing_takes_away_relief_and_keeps_shape_and_map() {
     };
     let before = off(&proxy);
     proxy.smooth(0.06);
-    // The filter lets the tube grow by almost a percent, which is what is left.
+    // The filter enlarges the tube by almost a percent, which is the remaining difference.
     assert!(off(&proxy) < 0.5 * before, "{} {before}", off(&proxy));
     let (there, here) = round_trips(&rough, &proxy);
     assert!(there < 0.01 && here < 0.01, "{there} {here}");
 }
 
 #[test]
-fn an_open_curve_goes_from_boundary_to_boundary() {
+fn a_transferred_open_curve_goes_from_boundary_to_boundary() {
     let map = |u: f64, v: f64| DVec3::new(0.2 * (TAU * u).cos(), 0.2 * (TAU * u).sin(), 0.7 * v);
     let tube = grid(120, 60, [true, false], map);
     let proxy = proxy_of(&tube, 1500);
-    // The same tube, coarse, stands for any: its column is followed on the proxy of the proxy's own.
+    // On a mesh that is its own proxy a column is transferred to itself.
     let coarse = grid(24, 12, [true, false], map);
     let own = proxy_of(&coarse, 10_000);
     let curve = column(24, 12, 5, false, 0.3);
@@ -354,7 +406,7 @@ fn an_open_curve_goes_from_boundary_to_boundary() {
     assert!((back.length(q) - 0.7).abs() < 0.02, "{}", back.length(q));
 }
 
-/// The curve up an upright tube from bottom to top in the plane `y = 0.031`.
+/// The curve along an upright tube from bottom to top in the plane `y = 0.031`.
 fn straight_up(mesh: &TriMesh) -> SurfaceCurve {
     let height = |v: VertexId| mesh.position(v).y - 0.031;
     let meets = |h: HalfedgeId| {
@@ -388,10 +440,7 @@ fn real_meshes_keep_their_topology_features_and_loops() {
         ("fertility_13k.off", 4000),
         ("rockerarm_5k.obj", 2000),
     ] {
-        let Some(mesh) = real_mesh(file) else {
-            eprintln!("no mesh {file}: skipped");
-            continue;
-        };
+        let Some(mesh) = real_mesh(file) else { continue };
         let proxy = proxy_of(&mesh, target);
         let off = hausdorff(&mesh, &proxy) / mean_edge(proxy.mesh());
         assert!(off < 0.35, "{file}: {off}");
@@ -402,7 +451,7 @@ fn real_meshes_keep_their_topology_features_and_loops() {
     }
     if let Some(mesh) = real_mesh("fertility_13k.off") {
         let proxy = proxy_of(&mesh, 4000);
-        for (curve, there) in carried_cycles(&mesh, &proxy, 30) {
+        for (curve, there) in transferred_cycles(&mesh, &proxy, 30) {
             assert!((there.length(&mesh) / curve.length(proxy.mesh()) - 1.0).abs() < 0.1);
         }
     }

@@ -1,34 +1,17 @@
-//! Refining a layout to a quad mesh (Campen, section 6.7): `m × n` quads per patch, `m` and `n` from the
-//! lengths of its chords, so that patches agree along their common arcs.
+//! Refinement of a layout to a quad mesh (Campen, section 6.7): `m × n` quads per patch.
+//!
+//! The isolines are those of the patch's two chords ([`Spacing`]), so patches agree along their common arcs.
 
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
+use super::quad_mesh::QuadMesh;
 use super::spacing::Spacing;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 
-/// A quad mesh that refines a layout.
-#[derive(Debug, Clone)]
-pub struct QuadMesh {
-    /// Vertex positions, in units of the mesh.
-    pub positions: Vec<DVec3>,
-    /// Corners of the quads, counter-clockwise.
-    pub quads: Vec<[u32; 4]>,
-    /// Layout patch of each quad.
-    pub patch: Vec<u32>,
-    /// Triangle of the original mesh that each vertex lies in (or touches).
-    pub base_face: Vec<u32>,
-    /// Whether each vertex lies on the boundary.
-    pub boundary: Vec<bool>,
-    /// Number of layout nodes; they are the first vertices, in order.
-    pub n_nodes: usize,
-    /// Vertices of each layout arc, from its first node to its second.
-    pub arcs: Vec<Vec<u32>>,
-}
-
-/// Refines every patch to the grid of the lines along its two chords.
-pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], stops: &Spacing) -> QuadMesh {
+/// Refines every patch to the grid of the isolines along its two chords.
+pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], spacing: &Spacing) -> QuadMesh {
     let position = |v: u32| embedding.mesh.positions[v as usize];
     let face_at = |v: u32| embedding.base_face[(embedding.mesh.outgoing(v)[0] / 3) as usize];
     let mut out = QuadMesh {
@@ -44,7 +27,7 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], sto
     for (a, arc) in (0..).zip(&layout.arcs) {
         let (path, along) = (&embedding.arcs[a as usize], &embedding.arc_parameters[a as usize]);
         first_on_arc.push(out.positions.len() as u32);
-        for (at, v) in along_path(path, along, &stops.along(a, true), position) {
+        for (at, v) in points_on_path(path, along, &spacing.along(a, true), position) {
             out.positions.push(at);
             out.base_face.push(face_at(v));
             out.boundary.push(arc.boundary);
@@ -53,37 +36,54 @@ pub fn refine(layout: &QuadLayout, embedding: &Embedding, maps: &[PatchMap], sto
         out.arcs.push([arc.nodes[0]].into_iter().chain(inner).chain([arc.nodes[1]]).collect());
     }
     for (p, map) in maps.iter().enumerate() {
-        let [across, up] = [0, 1].map(|i| {
+        let isolines = [0, 1].map(|i| {
             let (arc, forward) = layout.patches[p].sides[i];
-            stops.along(arc, forward)
+            spacing.along(arc, forward)
         });
-        let [m, n] = [&across, &up].map(|lines| lines.len() as u32 + 1);
+        let [m, n] = isolines.each_ref().map(|lines| lines.len() as u32 + 1);
         let ids = grid_ids(layout, p, (m, n), &first_on_arc, out.positions.len() as u32);
-        let inner: Vec<DVec2> =
-            up.iter().flat_map(|&v| across.iter().map(move |&u| map.size * DVec2::new(u, v))).collect();
-        for (at, f) in map.locate(&inner) {
-            out.positions.push(at);
-            out.base_face.push(f);
-            out.boundary.push(false);
-        }
-        for j in 0..n {
-            for i in 0..m {
-                out.quads.push([(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|c| ids[&c]));
-                out.patch.push(p as u32);
-            }
-        }
+        add_patch(&mut out, p, map, &isolines, &ids);
     }
     out
 }
 
-/// The points of a vertex path at these shares of the parameter given `along` it, each with a vertex near it.
-fn along_path(path: &[u32], along: &[f64], shares: &[f64], position: impl Fn(u32) -> DVec3) -> Vec<(DVec3, u32)> {
+/// Adds the inner vertices and the quads of patch `p`; `ids` are the vertices of its grid, and `isolines` the
+/// parameters of its inner columns and rows, as fractions.
+fn add_patch(
+    out: &mut QuadMesh,
+    p: usize,
+    map: &PatchMap,
+    [across, up]: &[Vec<f64>; 2],
+    ids: &HashMap<(u32, u32), u32>,
+) {
+    let inner: Vec<DVec2> = up.iter().flat_map(|&v| across.iter().map(move |&u| map.size * DVec2::new(u, v))).collect();
+    for (at, f) in map.locate(&inner) {
+        out.positions.push(at);
+        out.base_face.push(f);
+        out.boundary.push(false);
+    }
+    for j in 0..=up.len() as u32 {
+        for i in 0..=across.len() as u32 {
+            out.quads.push([(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|c| ids[&c]));
+            out.patch.push(p as u32);
+        }
+    }
+}
+
+/// The points of a vertex path at some fractions of its total parameter, each with the nearer vertex of its edge.
+/// `along` is the parameter at each vertex.
+fn points_on_path(
+    path: &[u32],
+    along: &[f64],
+    fractions: &[f64],
+    position: impl Fn(u32) -> DVec3,
+) -> Vec<(DVec3, u32)> {
     let total = along[along.len() - 1];
     let mut k = 0;
-    shares
+    fractions
         .iter()
-        .map(|share| {
-            let s = total * share;
+        .map(|fraction| {
+            let s = total * fraction;
             while k + 2 < path.len() && along[k + 1] < s {
                 k += 1;
             }
@@ -93,7 +93,8 @@ fn along_path(path: &[u32], along: &[f64], shares: &[f64], position: impl Fn(u32
         .collect()
 }
 
-/// The vertex ids of the grid of patch `p`; inner ones are numbered from `first_inner` on, row by row.
+/// Vertex ids of the grid of patch `p`, by column and row. Inner vertices are numbered from `first_inner` on, row by
+/// row.
 fn grid_ids(
     layout: &QuadLayout,
     p: usize,
@@ -111,7 +112,7 @@ fn grid_ids(
     for (k, &(arc, forward)) in patch.sides.iter().enumerate() {
         let count = if k % 2 == 0 { m } else { n };
         for s in 0..count {
-            // Place on the grid, going around counter-clockwise from corner `k`.
+            // The grid point at step `s` from corner `k`, counter-clockwise around the patch.
             let cell = [(s, 0), (m, s), (m - s.min(m), n), (0, n - s.min(n))][k];
             let id = if s == 0 {
                 patch.corners[k]
@@ -126,6 +127,12 @@ fn grid_ids(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
+    use proptest::prelude::*;
+
+    use super::super::adaptive_spacing::resampling_error;
+    use super::super::smooth::project;
     use super::*;
     use crate::dual::{Arrangement, Colour, assess, vertex_curvatures};
     use crate::layout::{embed, map_patches};
@@ -135,15 +142,26 @@ mod tests {
     use crate::testing::{column, row, square, torus};
 
     fn quads(mesh: &TriMesh, curves: &[SurfaceCurve], target: f64) -> (QuadLayout, QuadMesh) {
-        bent_quads(mesh, curves, target, |_, _| 0.0)
+        quads_for_curvature(mesh, curves, target, |_, _| 0.0)
     }
 
-    fn bent_quads(
+    fn quads_for_curvature(
         mesh: &TriMesh,
         curves: &[SurfaceCurve],
         target: f64,
-        bend: impl Fn(u32, DVec3) -> f64,
+        curvature: impl Fn(u32, DVec3) -> f64,
     ) -> (QuadLayout, QuadMesh) {
+        let (layout, embedding, maps) = mapped(mesh, curves);
+        let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
+        let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
+        assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
+        let spacing = Spacing::curvature_adapted(&layout, &maps, curvature, whole / (target * target));
+        let mesh = refine(&layout, &embedding, &maps, &spacing);
+        (layout, mesh)
+    }
+
+    /// The layout dual to some curves, with its initial embedding and patch maps.
+    fn mapped(mesh: &TriMesh, curves: &[SurfaceCurve]) -> (QuadLayout, Embedding, Vec<PatchMap>) {
         let arrangement = Arrangement::new(mesh, curves).unwrap();
         let reports = assess(&arrangement, &vertex_curvatures(mesh), &[]);
         assert!(reports.iter().all(|r| r.colour != Colour::Red), "{reports:?}");
@@ -152,22 +170,49 @@ mod tests {
         let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
         let maps = map_patches(&layout, &embedding, &progress).unwrap();
         assert!(maps.iter().all(|m| m.flipped == 0));
-        let area: f64 = maps.iter().flat_map(|m| m.mesh.faces().map(|f| m.mesh.face_area(f))).sum();
-        let whole: f64 = mesh.faces().map(|f| mesh.face_area(f)).sum();
-        assert!((area - whole).abs() < 1e-9 * whole, "the patches cover the surface once");
-        let mesh = refine(
-            &layout,
-            &embedding,
-            &maps,
-            &Spacing::curvature_adapted(&layout, &maps, bend, whole / (target * target)),
-        );
-        (layout, mesh)
+        (layout, embedding, maps)
     }
 
     /// Euler characteristic of an all-quad mesh; panics if it is not an oriented manifold.
     fn euler(q: &QuadMesh) -> i64 {
         let triangles: Vec<[u32; 3]> = q.quads.iter().flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]).collect();
         TriMesh::from_faces(q.positions.clone(), &triangles).unwrap().euler_characteristic()
+    }
+
+    static TORUS: LazyLock<TriMesh> = LazyLock::new(|| torus(64, 32));
+    static TORUS_PATCH: LazyLock<(QuadLayout, Embedding, Vec<PatchMap>)> =
+        LazyLock::new(|| mapped(&TORUS, &[row(64, 8, true, 0.4), column(64, 32, 14, true, 0.7)]));
+
+    /// A torus of one patch refined to `m × n` quads, projected onto it.
+    fn resampled(counts: [u32; 2]) -> QuadMesh {
+        let (layout, embedding, maps) = &*TORUS_PATCH;
+        let mut quads = refine(layout, embedding, maps, &Spacing::even(layout, &counts));
+        project(&mut quads, &TORUS);
+        quads
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn resampling_gives_a_manifold_with_the_requested_counts_and_an_error_that_falls(
+            m in 3u32..10, n in 3u32..10,
+        ) {
+            let quads = resampled([m, n]);
+            prop_assert_eq!(quads.quads.len() as u32, m * n);
+            prop_assert_eq!(quads.positions.len(), quads.base_face.len());
+            prop_assert_eq!(euler(&quads), 0);
+            for (p, &f) in quads.positions.iter().zip(&quads.base_face) {
+                let corners = TORUS.face_vertices(crate::mesh::FaceId(f)).map(|v| TORUS.position(v));
+                let weights = crate::surface::nearest_in_triangle(*p, &corners);
+                let nearest: DVec3 = corners.iter().zip(weights).map(|(&c, w)| c * w).sum();
+                prop_assert!(nearest.distance(*p) < 1e-9);
+            }
+            // The error is quadratic in the edge length: with half of it a quarter, at most half where quads are
+            // coarse.
+            let (coarse, fine) = (resampling_error(&quads, &TORUS), resampling_error(&resampled([2 * m, 2 * n]), &TORUS));
+            prop_assert!(fine < 0.5 * coarse, "{} {}", coarse, fine);
+        }
     }
 
     #[test]
@@ -206,24 +251,25 @@ mod tests {
     }
 
     #[test]
-    fn quads_are_narrow_along_which_the_surface_bends() {
+    fn quads_are_shorter_in_the_direction_of_curvature() {
         let curves = [row(8, 2, false, 0.5), column(8, 8, 3, false, 0.5)];
-        let (_, even) = bent_quads(&square(8), &curves, 0.05, |_, _| 2.0);
-        let (_, bent) = bent_quads(&square(8), &curves, 0.05, |_, along| 2.0 * along.x.abs());
+        let (_, even) = quads_for_curvature(&square(8), &curves, 0.05, |_, _| 2.0);
+        let (_, adapted) = quads_for_curvature(&square(8), &curves, 0.05, |_, along| 2.0 * along.x.abs());
+        // Mean extents of the quads along both axes.
         let sides = |mesh: &QuadMesh| {
-            let reach = |axis: usize| {
+            let extent = |axis: usize| {
                 let of = |q: &[u32; 4]| {
                     let along = q.map(|v| mesh.positions[v as usize][axis]);
                     along.iter().fold(f64::MIN, |a, b| a.max(*b)) - along.iter().fold(f64::MAX, |a, b| a.min(*b))
                 };
                 mesh.quads.iter().map(of).sum::<f64>() / mesh.quads.len() as f64
             };
-            (reach(0), reach(1))
+            (extent(0), extent(1))
         };
         let (x, y) = sides(&even);
-        assert!((x - y).abs() < 1e-6, "the same bend everywhere changes nothing: {x} {y}");
-        let (x, y) = sides(&bent);
+        assert!((x - y).abs() < 1e-6, "constant curvature changes nothing: {x} {y}");
+        let (x, y) = sides(&adapted);
         assert!(x < 0.8 * y, "{x} {y}");
-        assert!((bent.quads.len() as f64 / even.quads.len() as f64 - 1.0).abs() < 0.1);
+        assert!((adapted.quads.len() as f64 / even.quads.len() as f64 - 1.0).abs() < 0.1);
     }
 }

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::StripCoverage;
-use crate::field::{CrossField, EdgePath, Step, pronounced};
+use crate::field::{CrossField, EdgePath, Step, cancel_opposite_pairs};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::surface::Metric;
 
@@ -62,7 +62,7 @@ pub(super) fn conquer(ground: &Ground<'_>, paths: &[EdgePath]) -> Conquered {
         closed[f.index()] = ground.flipped[f.index()] && ground.metric.area(f) > SLIVER * mean;
     }
     let mut singular = vec![false; ground.mesh.n_vertices()];
-    for s in pronounced(ground.mesh, &ground.field.singularities, PAIR) {
+    for s in cancel_opposite_pairs(ground.mesh, &ground.field.singularities, PAIR) {
         singular[s.vertex.index()] = true;
     }
     let results: Vec<_> = paths.par_iter().map(|p| conquer_one(ground, &closed, &singular, p)).collect();
@@ -113,7 +113,11 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
     let mut taken = Vec::new();
     let mut visited = vec![[false; 2]; g.mesh.n_faces()];
     for (side, bound) in bounds.iter_mut().enumerate() {
-        let seeds = path.steps.iter().zip(&path.lean).filter_map(|(&s, &lean)| seed(g, s, lean, side));
+        let seeds = path
+            .steps
+            .iter()
+            .zip(&path.tangent_offset)
+            .filter_map(|(&s, &tangent_offset)| seed(g, s, tangent_offset, side));
         let (reached, mut part) = conquer_side(g, closed, singular, seeds, &mut visited);
         *bound = reached;
         if side == 1 {
@@ -128,12 +132,12 @@ fn conquer_one(g: &Ground<'_>, closed: &[bool], singular: &[bool], path: &EdgePa
 
 /// The triangle left (side 0) or right of a step, and the lift in which the distance is zero on the step and
 /// positive inside.
-fn seed(g: &Ground<'_>, step: Step, lean: f64, side: usize) -> Option<(FaceId, Lift)> {
+fn seed(g: &Ground<'_>, step: Step, tangent_offset: f64, side: usize) -> Option<(FaceId, Lift)> {
     let (left, right) = (step.left(g.mesh), step.right(g.mesh));
     // Along `h` runs branch `along` of the chart; to its left, a quarter turn on, the inside, or the outside.
     let inside = |h: HalfedgeId, quarters: i32| {
         let f = g.mesh.face(h);
-        let branch = g.field.branch_along(g.metric, h, lean) + quarters;
+        let branch = g.field.branch_along(g.metric, h, tangent_offset) + quarters;
         Lift { branch, offset: -component(g.uv[f.index()][h.index() % 3], branch), travelled: 0.0 }
     };
     match (side, left, right) {

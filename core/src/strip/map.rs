@@ -34,9 +34,9 @@ pub(super) fn kept_coordinates(
     metric: &Metric,
     field: &CrossField,
     step: Step,
-    lean: f64,
+    tangent_offset: f64,
 ) -> impl Iterator<Item = (HalfedgeId, u8)> {
-    let nearest = |h| (field.branch_along(metric, h, lean) + 1).rem_euclid(2) as u8;
+    let nearest = |h| (field.branch_along(metric, h, tangent_offset) + 1).rem_euclid(2) as u8;
     let (left, right) = (step.left(mesh), step.right(mesh));
     let on_left = left.map(|h| (h, nearest(h)));
     let on_right = right.map(|r| match on_left {
@@ -53,8 +53,8 @@ fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePa
         SurfacePoint { face: mesh.face(h), weights }
     };
     // What holds on one side holds on the other by the seam's equations.
-    let kept = |(&step, &lean)| kept_coordinates(mesh, metric, field, step, lean).next();
-    let steps = paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean));
+    let kept = |(&step, &tangent_offset)| kept_coordinates(mesh, metric, field, step, tangent_offset).next();
+    let steps = paths.iter().flat_map(|p| p.steps.iter().zip(&p.tangent_offset));
     steps
         .filter_map(kept)
         .map(|(h, axis)| CoordinateConstraint {

@@ -121,8 +121,8 @@ impl StripMap {
 
 fn residual(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath], uv: &[[DVec2; 3]]) -> f64 {
     let mut worst: f64 = 0.0;
-    for (step, &lean) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.lean)) {
-        for (h, c) in map::kept_coordinates(mesh, metric, field, *step, lean) {
+    for (step, &tangent_offset) in paths.iter().flat_map(|p| p.steps.iter().zip(&p.tangent_offset)) {
+        for (h, c) in map::kept_coordinates(mesh, metric, field, *step, tangent_offset) {
             let [a, b] = [h, mesh.next(h)].map(|h| uv[h.index() / 3][h.index() % 3][c as usize]);
             worst = worst.max((a - b).abs());
         }

@@ -1,30 +1,33 @@
-//! Principal curvatures by normal cycles, averaged over a ball of chosen radius.
+//! Principal curvatures at vertices by normal cycles (Cohen-Steiner and Morvan 2003), averaged over a ball.
 //!
-//! Each edge carries the tensor `β |e| ē ēᵀ` (β: signed angle between its two normals, convex positive), whose sum
-//! over a region divided by the area converges to the shape operator with its two principal directions swapped
-//! (Cohen-Steiner and Morvan 2003). To keep the cost independent of the radius, the tensors are first summed over
-//! small patches; a vertex then gathers the patches whose centre it reaches within the radius. Patches end at sharp
-//! edges and the gathering does not pass them, so that one side of a crease does not blur the other; the
-//! crease itself counts for both.
-
-use std::collections::VecDeque;
+//! Each edge carries the tensor `β |e| ē ēᵀ` (`β`: signed dihedral angle, positive where convex; `ē`: unit vector along
+//! the edge). Their sum over a region, divided by its area, converges to the shape operator with its two principal
+//! directions swapped. To make the cost independent of the radius, tensors are first summed over small patches of
+//! vertices; a vertex then sums the patches with centres within the radius. Patches end at sharp edges and the
+//! breadth-first traversal of patches stops there, so that one side of a crease does not blur the other; the crease
+//! itself counts for both.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::mesh::{TriMesh, VertexId};
+use super::tangent_tensor::{outer, plane_eigen};
+use crate::mesh::{BreadthFirst, TriMesh, VertexId};
 
-/// Patch radius relative to the averaging radius: about 60 patches in a ball, which moves the mean of a linear
-/// curvature by less than a percent.
+/// Radius of a patch, as a fraction of the averaging radius. A ball then holds about 60 patches, which moves the mean
+/// of a linearly varying curvature by less than a percent.
 const PATCH_RADIUS: f64 = 0.25;
 
-/// Averaging radius never below this many mean edge lengths around the vertex: a single ring is mostly noise.
+/// Least averaging radius, in mean edge lengths around the vertex. A single ring of triangles gives mostly noise.
 const LEAST_RADIUS_IN_EDGES: f64 = 1.5;
+
+/// Vertices that share one array of visited marks. Marks are kept per chunk and not per thread, so that the result does
+/// not depend on the number of threads.
+const CHUNK: usize = 1024;
 
 /// Principal curvatures and directions at a vertex.
 ///
 /// Curvatures are positive where the surface is convex seen from outside (1/R on a sphere); `k_min ≤ k_max` as
-/// signed numbers. Directions are unit, tangent to the surface, orthogonal, and of no particular sign.
+/// signed numbers. Directions are unit vectors, tangent to the surface, orthogonal, and of no particular sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrincipalCurvature {
     /// Smaller curvature.
@@ -37,7 +40,7 @@ pub struct PrincipalCurvature {
     pub d_max: DVec3,
 }
 
-/// Shape tensor and area of a piece of surface, with its centre.
+/// Normal-cycle tensor, area and centre of a piece of surface.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     tensor: DMat3,
@@ -45,57 +48,19 @@ struct Piece {
     centre: DVec3,
 }
 
-/// Principal curvatures at all vertices, averaged over about `radius` (in the units of the mesh); `sharp` has a flag
-/// per edge.
+/// Principal curvatures at all vertices, averaged over about `radius` (in units of the mesh); `sharp` has a flag per
+/// edge.
 pub fn principal_curvature(mesh: &TriMesh, radius: f64, sharp: &[bool]) -> Vec<PrincipalCurvature> {
-    let on_crease =
-        |v: VertexId| mesh.outgoing(v).any(|h| sharp[mesh.edge(h).index()] || sharp[mesh.edge(mesh.prev(h)).index()]);
-    let crease: Vec<bool> = mesh.vertices().map(on_crease).collect();
-    let pieces: Vec<Piece> = (0..mesh.n_vertices()).into_par_iter().map(|v| ring(mesh, VertexId::new(v))).collect();
-    let (patch_of, patches) = patches(mesh, PATCH_RADIUS * radius, &crease, &pieces);
-    let (first, neighbours) = adjacency(mesh, &patch_of, patches.len());
-    let wall: Vec<bool> = {
-        let mut wall = vec![false; patches.len()];
-        for v in mesh.vertices().filter(|v| crease[v.index()]) {
-            wall[patch_of[v.index()] as usize] = true;
-        }
-        wall
-    };
-    // Visited marks are kept per chunk, so that each costs one allocation and the result no order of threads.
-    let chunk = 1024;
-    let chunks: Vec<Vec<PrincipalCurvature>> = (0..mesh.n_vertices().div_ceil(chunk))
+    let patches = Patches::new(mesh, PATCH_RADIUS * radius, sharp);
+    let chunks: Vec<Vec<PrincipalCurvature>> = (0..mesh.n_vertices().div_ceil(CHUNK))
         .into_par_iter()
         .map(|c| {
-            let mut seen = vec![u32::MAX; patches.len()];
-            let mut queue = Vec::new();
-            (c * chunk..((c + 1) * chunk).min(mesh.n_vertices()))
+            let mut visited = Visited { by: vec![u32::MAX; patches.pieces.len()], queue: Vec::new() };
+            (c * CHUNK..((c + 1) * CHUNK).min(mesh.n_vertices()))
                 .map(|i| {
                     let v = VertexId::new(i);
                     let radius = radius.max(LEAST_RADIUS_IN_EDGES * mean_edge(mesh, v));
-                    queue.clear();
-                    queue.push(patch_of[i]);
-                    seen[patch_of[i] as usize] = i as u32;
-                    let (mut tensor, mut area) = (DMat3::ZERO, 0.0);
-                    let mut next = 0;
-                    while next < queue.len() {
-                        let p = queue[next] as usize;
-                        next += 1;
-                        let distance = patches[p].centre.distance(mesh.position(v));
-                        let weight = if next == 1 { 1.0 } else { (1.0 - (distance / radius).powi(2)).max(0.0) };
-                        tensor += patches[p].tensor * weight;
-                        area += patches[p].area * weight;
-                        if weight == 0.0 || (wall[p] && next > 1) {
-                            continue;
-                        }
-                        for &n in &neighbours[first[p] as usize..first[p + 1] as usize] {
-                            if seen[n as usize] != i as u32 {
-                                seen[n as usize] = i as u32;
-                                queue.push(n);
-                            }
-                        }
-                    }
-                    let tensor = if area > 0.0 { tensor * (1.0 / area) } else { DMat3::ZERO };
-                    principal(tensor, vertex_normal(mesh, v))
+                    principal(patches.mean_tensor(mesh, v, radius, &mut visited), vertex_normal(mesh, v))
                 })
                 .collect()
         })
@@ -113,8 +78,8 @@ fn vertex_normal(mesh: &TriMesh, v: VertexId) -> DVec3 {
     angle_weighted.try_normalize().unwrap_or(DVec3::Z)
 }
 
-/// What belongs to one vertex: half of its edges, a third of its triangles.
-fn ring(mesh: &TriMesh, v: VertexId) -> Piece {
+/// The share of a vertex: half of its edges, a third of its triangles.
+fn vertex_piece(mesh: &TriMesh, v: VertexId) -> Piece {
     let (mut tensor, mut area) = (DMat3::ZERO, 0.0);
     for h in mesh.outgoing(v) {
         area += mesh.face_area(mesh.face(h)) / 3.0;
@@ -129,42 +94,100 @@ fn ring(mesh: &TriMesh, v: VertexId) -> Piece {
     Piece { tensor, area, centre: mesh.position(v) }
 }
 
-fn outer(e: DVec3) -> DMat3 {
-    DMat3::from_cols(e * e.x, e * e.y, e * e.z)
+/// Marks of one breadth-first traversal of patches after another.
+struct Visited {
+    /// The last vertex from which each patch was reached.
+    by: Vec<u32>,
+    queue: Vec<u32>,
 }
 
-/// Groups vertices into patches of the given radius, greedily in order; vertices on creases stay alone.
-fn patches(mesh: &TriMesh, radius: f64, crease: &[bool], pieces: &[Piece]) -> (Vec<u32>, Vec<Piece>) {
+/// A partition of the vertices into patches.
+struct Patches {
+    /// The patch of each vertex.
+    of_vertex: Vec<u32>,
+    pieces: Vec<Piece>,
+    /// Whether a patch is a vertex on a crease.
+    on_crease: Vec<bool>,
+    /// The neighbours of patch `p` are `neighbours[first[p]..first[p + 1]]`.
+    first: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl Patches {
+    fn new(mesh: &TriMesh, radius: f64, sharp: &[bool]) -> Self {
+        let on_crease = |v: VertexId| {
+            mesh.outgoing(v).any(|h| sharp[mesh.edge(h).index()] || sharp[mesh.edge(mesh.prev(h)).index()])
+        };
+        let crease: Vec<bool> = mesh.vertices().map(on_crease).collect();
+        let shares: Vec<Piece> =
+            (0..mesh.n_vertices()).into_par_iter().map(|v| vertex_piece(mesh, VertexId::new(v))).collect();
+        let (of_vertex, pieces) = group(mesh, radius, &crease, &shares);
+        let (first, neighbours) = adjacency(mesh, &of_vertex, pieces.len());
+        let mut on_crease = vec![false; pieces.len()];
+        for v in mesh.vertices().filter(|v| crease[v.index()]) {
+            on_crease[of_vertex[v.index()] as usize] = true;
+        }
+        Self { of_vertex, pieces, on_crease, first, neighbours }
+    }
+
+    /// Tensor per area around a vertex: the mean over patches within `radius`, weighted by `1 − (distance / radius)²`;
+    /// the patch of the vertex has weight 1.
+    fn mean_tensor(&self, mesh: &TriMesh, v: VertexId, radius: f64, visited: &mut Visited) -> DMat3 {
+        let (home, stamp) = (self.of_vertex[v.index()], v.index() as u32);
+        let Visited { by, queue } = visited;
+        queue.clear();
+        queue.push(home);
+        by[home as usize] = stamp;
+        let (mut tensor, mut area) = (DMat3::ZERO, 0.0);
+        let mut next = 0;
+        while next < queue.len() {
+            let p = queue[next] as usize;
+            next += 1;
+            let distance = self.pieces[p].centre.distance(mesh.position(v));
+            let weight = if next == 1 { 1.0 } else { (1.0 - (distance / radius).powi(2)).max(0.0) };
+            tensor += self.pieces[p].tensor * weight;
+            area += self.pieces[p].area * weight;
+            if weight == 0.0 || (self.on_crease[p] && next > 1) {
+                continue;
+            }
+            for &n in &self.neighbours[self.first[p] as usize..self.first[p + 1] as usize] {
+                if by[n as usize] != stamp {
+                    by[n as usize] = stamp;
+                    queue.push(n);
+                }
+            }
+        }
+        if area > 0.0 { tensor * (1.0 / area) } else { DMat3::ZERO }
+    }
+}
+
+/// Groups vertices into patches of the given radius, greedily in order of ids; a vertex on a crease is a patch of its
+/// own.
+fn group(mesh: &TriMesh, radius: f64, crease: &[bool], shares: &[Piece]) -> (Vec<u32>, Vec<Piece>) {
     let mut patch_of = vec![u32::MAX; mesh.n_vertices()];
     let mut patches = Vec::new();
-    let mut queue = VecDeque::new();
+    let mut search: BreadthFirst<VertexId, ()> = BreadthFirst::new(mesh.n_vertices());
     for seed in mesh.vertices() {
-        if patch_of[seed.index()] != u32::MAX {
+        if !search.start(seed) {
             continue;
         }
         let id = patches.len() as u32;
-        patch_of[seed.index()] = id;
-        queue.push_back(seed);
         let (mut tensor, mut area, mut moment, mut centre, mut count) =
             (DMat3::ZERO, 0.0, DVec3::ZERO, DVec3::ZERO, 0.0);
-        while let Some(v) = queue.pop_front() {
-            let piece = &pieces[v.index()];
-            tensor += piece.tensor;
-            area += piece.area;
-            moment += piece.centre * piece.area;
-            centre += piece.centre;
+        while let Some(v) = search.visit() {
+            patch_of[v.index()] = id;
+            let share = &shares[v.index()];
+            tensor += share.tensor;
+            area += share.area;
+            moment += share.centre * share.area;
+            centre += share.centre;
             count += 1.0;
             if crease[v.index()] {
                 continue;
             }
-            for h in mesh.outgoing(v) {
-                // The target of each spoke; the last spoke of a boundary fan is the target of `next`.
-                for w in [mesh.target(h), mesh.opposite(h)] {
-                    let near = mesh.position(w).distance(mesh.position(seed)) <= radius;
-                    if patch_of[w.index()] == u32::MAX && !crease[w.index()] && near {
-                        patch_of[w.index()] = id;
-                        queue.push_back(w);
-                    }
+            for (_, w) in mesh.spokes(v) {
+                if !crease[w.index()] && mesh.position(w).distance(mesh.position(seed)) <= radius {
+                    search.reach(w, ());
                 }
             }
         }
@@ -174,7 +197,7 @@ fn patches(mesh: &TriMesh, radius: f64, crease: &[bool], pieces: &[Piece]) -> (V
     (patch_of, patches)
 }
 
-/// Which patches touch, as compressed rows.
+/// Adjacency of patches in compressed sparse row form: offsets and neighbours.
 fn adjacency(mesh: &TriMesh, patch_of: &[u32], n: usize) -> (Vec<u32>, Vec<u32>) {
     let mut pairs: Vec<(u32, u32)> = mesh
         .edges()
@@ -196,16 +219,11 @@ fn adjacency(mesh: &TriMesh, patch_of: &[u32], n: usize) -> (Vec<u32>, Vec<u32>)
     (first, pairs.into_iter().map(|(_, b)| b).collect())
 }
 
-/// Principal curvatures of a normal-cycle tensor in the plane with normal `n`.
+/// Principal curvatures of a normal-cycle tensor in the plane with unit normal `n`.
 fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
-    let (x, y) = n.any_orthonormal_pair();
-    let (a, b, c) = (x.dot(tensor * x), x.dot(tensor * y), y.dot(tensor * y));
-    let (mean, difference) = (0.5 * (a + c), 0.5 * (a - c));
-    let root = difference.hypot(b);
-    let angle = 0.5 * b.atan2(difference);
-    // The tensor stretches along the edges: its larger eigenvalue belongs across, see the head of the file.
-    let along = x * angle.cos() + y * angle.sin();
-    PrincipalCurvature { k_min: mean - root, k_max: mean + root, d_min: along, d_max: n.cross(along) }
+    let eigen = plane_eigen(tensor, n);
+    // The eigenvector of the larger eigenvalue is the direction of the smaller curvature: see the head of the file.
+    PrincipalCurvature { k_min: eigen.low, k_max: eigen.high, d_min: eigen.axis, d_max: n.cross(eigen.axis) }
 }
 
 #[cfg(test)]
@@ -223,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cylinder_curves_across_its_axis() {
+    fn a_cylinder_is_curved_across_its_axis() {
         let mesh = grid(60, 40, [true, false], |u, v| circle(u) * 0.5 + DVec3::Z * 4.0 * v);
         for radius in [0.0, 0.3] {
             for (v, c) in mesh.vertices().zip(curvature(&mesh, radius)) {
@@ -237,8 +255,8 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_is_convex_in_all_directions() {
-        // A band of the sphere of radius 2, without its poles.
+    fn a_sphere_has_equal_positive_curvatures() {
+        // A sphere of radius 2 without its poles.
         let mesh = grid(80, 40, [true, false], |u, v| {
             let b = (v - 0.5) * 2.6;
             (circle(u) * b.cos() + DVec3::Z * b.sin()) * 2.0
@@ -251,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torus_has_its_textbook_curvatures() {
+    fn a_torus_has_its_analytic_curvatures() {
         let (big, small) = (1.0, 0.4);
         let tau = std::f64::consts::TAU;
         let mesh = grid(120, 60, [true, true], |u, v| {
@@ -263,14 +281,14 @@ mod tests {
             let across = (rho - big) / small / rho;
             assert!((c.k_max - 1.0 / small).abs() < 0.15, "{c:?}");
             assert!((c.k_min - across).abs() < 0.15, "{c:?} at {rho}, expected {across}");
-            // The smaller curvature runs the long way round.
-            let round = DVec3::Z.cross(p).normalize();
-            assert!(c.d_min.dot(round).abs() > 0.98, "{c:?}");
+            // The smaller curvature is along the larger circle.
+            let along = DVec3::Z.cross(p).normalize();
+            assert!(c.d_min.dot(along).abs() > 0.98, "{c:?}");
         }
     }
 
     #[test]
-    fn directions_are_a_frame_and_flat_pieces_stay_finite() {
+    fn a_flat_mesh_has_curvature_zero_and_orthonormal_directions() {
         let flat = grid(6, 3, [true, false], |u, v| circle(u) * (1.0 + v));
         for c in curvature(&flat, 0.5) {
             assert_eq!((c.k_min, c.k_max), (0.0, 0.0));

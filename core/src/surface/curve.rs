@@ -1,32 +1,37 @@
 //! Curves on the surface, as the list of mesh edges they cross.
 //!
-//! A curve never passes through a vertex: it crosses edges strictly between their ends, and inside a triangle
-//! it is the straight segment from the crossing where it enters to the crossing where it leaves. What two
-//! curves do to each other follows from the order of their crossings along the edges alone, so that no
-//! floating-point intersection ever decides topology.
+//! A curve crosses edges strictly between their ends and never passes through a vertex; inside a triangle it is the
+//! straight segment between two crossings. The order of crossings along edges alone determines how two curves
+//! intersect, so topology never depends on a floating-point intersection of segments.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::SurfacePoint;
+use super::point::SurfacePoint;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
-/// The place where a curve crosses a mesh edge.
+/// Where a curve crosses a mesh edge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Crossing {
-    /// The half-edge crossed, seen from the triangle that the curve *leaves* here. At the start of an open
-    /// curve no triangle is left: there it is the boundary half-edge of the triangle entered.
+    /// The half-edge crossed, in the triangle that the curve *leaves*. At the start of an open curve it is the boundary
+    /// half-edge of the triangle that the curve enters.
     pub halfedge: HalfedgeId,
-    /// Where on the half-edge, from its origin (0) to its target (1), strictly between both.
+    /// Parameter on the half-edge, from its origin (0) to its target (1), strictly between both.
     pub t: f64,
+}
+
+impl Crossing {
+    /// Position in space, in units of the mesh.
+    pub fn position(&self, mesh: &TriMesh) -> DVec3 {
+        mesh.position(mesh.origin(self.halfedge)).lerp(mesh.position(mesh.target(self.halfedge)), self.t)
+    }
 }
 
 /// A curve on a triangle mesh: closed, or open from boundary to boundary.
 ///
-/// `crossings[i].halfedge` belongs to the triangle traversed between crossing `i − 1` and crossing `i`
-/// (cyclically for a closed curve). An open curve has a boundary half-edge as its first and as its last
-/// crossing and nowhere else.
+/// `crossings[i].halfedge` belongs to the triangle traversed between crossings `i − 1` and `i` (cyclically for a closed
+/// curve). The first and the last crossing of an open curve are boundary half-edges, and no others are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceCurve {
     /// The crossings in order.
@@ -38,32 +43,32 @@ pub struct SurfaceCurve {
 /// Why a list of crossings is not a curve on a mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CurveError {
-    /// A half-edge that the mesh does not have.
-    #[error("crossing {crossing} names a half-edge that the mesh does not have")]
+    /// The mesh has no such half-edge.
+    #[error("crossing {crossing} is on a half-edge that the mesh does not have")]
     UnknownHalfedge {
         /// Position in the list of crossings.
         crossing: usize,
     },
-    /// A parameter that is not strictly between 0 and 1.
-    #[error("crossing {crossing} is not strictly inside its edge")]
+    /// The parameter is not strictly between 0 and 1.
+    #[error("crossing {crossing} is not strictly between the ends of its edge")]
     OutsideEdge {
         /// Position in the list of crossings.
         crossing: usize,
     },
-    /// Two crossings in a row that are not on one triangle, or on one edge.
-    #[error("crossing {crossing} does not follow from the one before")]
+    /// Two consecutive crossings are not on two different edges of one triangle.
+    #[error("crossing {crossing} and the one before it are not on two edges of one triangle")]
     Disconnected {
         /// Position in the list of crossings.
         crossing: usize,
     },
-    /// A closed curve that touches the boundary, or an open one that does not end there.
-    #[error("crossing {crossing} meets the boundary where it should not, or misses it where it should")]
+    /// An inner crossing is on the boundary, or an end of an open curve is not.
+    #[error("crossing {crossing} is on the boundary but no end of an open curve, or an end but not on the boundary")]
     Boundary {
         /// Position in the list of crossings.
         crossing: usize,
     },
-    /// Fewer crossings than any curve has.
-    #[error("a curve of only {count} crossings")]
+    /// A closed curve has at least 3 crossings, an open one 2.
+    #[error("the curve has only {count} crossings")]
     TooShort {
         /// Number of crossings.
         count: usize,
@@ -71,13 +76,12 @@ pub enum CurveError {
 }
 
 impl SurfaceCurve {
-    /// The point on the mesh at crossing `i`.
+    /// Position of crossing `i` in space.
     pub fn point(&self, mesh: &TriMesh, i: usize) -> DVec3 {
-        let c = self.crossings[i];
-        mesh.position(mesh.origin(c.halfedge)).lerp(mesh.position(mesh.target(c.halfedge)), c.t)
+        self.crossings[i].position(mesh)
     }
 
-    /// Crossing `i` as a point of the triangle left there.
+    /// Crossing `i` as a point of the triangle of its half-edge.
     pub fn surface_point(&self, mesh: &TriMesh, i: usize) -> SurfacePoint {
         let Crossing { halfedge, t } = self.crossings[i];
         let mut weights = [0.0; 3];
@@ -86,12 +90,12 @@ impl SurfaceCurve {
         SurfacePoint { face: mesh.face(halfedge), weights }
     }
 
-    /// The points at all crossings; a closed curve does not repeat its first.
+    /// Positions of all crossings; the first is not repeated at the end of a closed curve.
     pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
         (0..self.crossings.len()).map(|i| self.point(mesh, i)).collect()
     }
 
-    /// Length on the mesh.
+    /// Length on the mesh, in units of the mesh.
     pub fn length(&self, mesh: &TriMesh) -> f64 {
         let points = self.points(mesh);
         let open: f64 = points.windows(2).map(|w| w[0].distance(w[1])).sum();
@@ -101,13 +105,13 @@ impl SurfaceCurve {
         }
     }
 
-    /// The triangle traversed just before crossing `i`; `None` at the start of an open curve.
+    /// The triangle traversed before crossing `i`; `None` at the start of an open curve.
     pub fn face_before(&self, mesh: &TriMesh, i: usize) -> Option<FaceId> {
         (self.closed || i > 0).then(|| mesh.face(self.crossings[i].halfedge))
     }
 
-    /// Checks that the curve lies on `mesh`: known edges, inner parameters, consecutive crossings in one
-    /// triangle, ends on the boundary just where the curve is open.
+    /// Checks that the curve lies on `mesh`: half-edges exist, parameters are inside `(0, 1)`, consecutive crossings
+    /// are in one triangle, and exactly the ends of an open curve are on the boundary.
     ///
     /// # Errors
     ///
@@ -156,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_across_a_square() {
+    fn an_open_curve_across_a_square_is_valid() {
         let m = square();
         // From the bottom side over the diagonal to the top side.
         let c = SurfaceCurve { crossings: vec![crossing(0, 0.5), crossing(2, 0.5), crossing(4, 0.5)], closed: false };
@@ -165,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_curves_are_named() {
+    fn an_invalid_crossing_is_reported_with_its_index() {
         let m = square();
         let check = |list: &[Crossing]| SurfaceCurve { crossings: list.to_vec(), closed: false }.check(&m).unwrap_err();
         assert_eq!(check(&[crossing(0, 0.5)]), CurveError::TooShort { count: 1 });

@@ -1,10 +1,10 @@
 //! The intrinsic metric of a mesh: every triangle laid out in its own plane.
 //!
-//! Directions in a triangle are angles from its half-edge 0, counter-clockwise; unfolding two triangles about
-//! their common edge transports a direction from one to the other. Lengths are those of the mesh, all enlarged
-//! by the same tiny amount if that is needed to keep every triangle inequality strict ("mollified": Sharp and
-//! Crane, A Laplacian for Nonmanifold Triangle Meshes, section 4.5), so that slivers and collapsed triangles have
-//! finite cotangents and every angle exists.
+//! Directions in a triangle are angles from its half-edge 0, counter-clockwise, in radians. Unfolding two triangles
+//! about their common edge transports a direction from one to the other. Edge lengths are those of the mesh, all
+//! increased by the same tiny amount where that is needed to keep every triangle inequality strict (intrinsic
+//! mollification: Sharp and Crane, A Laplacian for Nonmanifold Triangle Meshes, section 4.5). So slivers and degenerate
+//! triangles have angles and finite cotangents.
 
 use std::f64::consts::PI;
 
@@ -12,16 +12,19 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
-/// By how much, relative to the mean edge length, two sides of a triangle outlast the third: small enough not to
-/// be seen, large enough for cotangents below 100 in a collapsed triangle of mean size.
+/// Least excess of two sides of a triangle over the third, relative to the mean edge length. Small enough to be
+/// invisible, large enough for cotangents below 100 in a degenerate triangle of mean size.
 const SLACK: f64 = 1e-4;
+
+/// Squared length of a projected vector, relative to that of the vector, up to which it has no direction.
+const NO_DIRECTION: f64 = 1e-24;
 
 /// Planar layouts of all triangles.
 #[derive(Debug, Clone)]
 pub struct Metric {
-    /// Corners of each triangle: 0 in the origin, 1 on the positive first axis, 2 above it.
+    /// Corners of each triangle: 0 at the origin, 1 on the positive first axis, 2 above it.
     layout: Vec<[DVec2; 3]>,
-    /// Direction of each half-edge in its triangle.
+    /// Direction of each half-edge in its triangle, in radians.
     direction: Vec<f64>,
 }
 
@@ -47,7 +50,7 @@ impl Metric {
         &self.layout[f.index()]
     }
 
-    /// The direction of a half-edge in the plane of its triangle.
+    /// The direction of a half-edge in the plane of its triangle, in radians.
     #[inline]
     pub fn direction(&self, h: HalfedgeId) -> f64 {
         self.direction[h.index()]
@@ -66,7 +69,7 @@ impl Metric {
         0.5 * (b - a).perp_dot(c - a)
     }
 
-    /// The interior angle at the origin of a half-edge.
+    /// The interior angle at the origin of a half-edge, in radians.
     #[inline]
     pub fn corner_angle(&self, h: HalfedgeId) -> f64 {
         let corners = &self.layout[h.index() / 3];
@@ -74,31 +77,33 @@ impl Metric {
         side(corners, i).angle_to(-side(corners, (i + 2) % 3))
     }
 
-    /// What is to be added to a direction in the triangle of `h` to have it in the triangle of its twin.
+    /// The angle to add to a direction in the triangle of `h` for the same direction in the triangle of its twin,
+    /// unfolded.
     #[inline]
     pub fn transport(&self, h: HalfedgeId, twin: HalfedgeId) -> f64 {
         self.direction(twin) + PI - self.direction(h)
     }
 
-    /// `2π` minus the angles at an inner vertex, `π` minus those at a boundary vertex.
+    /// Discrete Gaussian curvature (angle defect): `2π` minus the sum of angles at an inner vertex, `π` minus it at a
+    /// boundary vertex.
     pub fn curvature(&self, mesh: &TriMesh, v: VertexId) -> f64 {
         let flat = if mesh.is_boundary_vertex(v) { PI } else { 2.0 * PI };
         flat - mesh.outgoing(v).map(|h| self.corner_angle(h)).sum::<f64>()
     }
 
-    /// The unit tangent vector in space of a direction in a triangle; zero where the triangle has no normal.
+    /// The unit vector in space of a direction in a triangle; zero where the triangle has no normal.
     pub fn tangent(&self, mesh: &TriMesh, f: FaceId, angle: f64) -> DVec3 {
         let x = mesh.vector(mesh.face_halfedges(f)[0]).normalize_or_zero();
         let y = mesh.face_normal(f).cross(x);
         x * angle.cos() + y * angle.sin()
     }
 
-    /// The direction in a triangle of the projection of a vector; `None` where that vanishes.
+    /// The direction in a triangle of a vector projected onto its plane; `None` where the projection vanishes.
     pub fn angle_of(&self, mesh: &TriMesh, f: FaceId, vector: DVec3) -> Option<f64> {
         let x = mesh.vector(mesh.face_halfedges(f)[0]).normalize_or_zero();
         let y = mesh.face_normal(f).cross(x);
         let flat = DVec2::new(vector.dot(x), vector.dot(y));
-        (flat.length_squared() > 1e-24 * vector.length_squared()).then(|| flat.to_angle())
+        (flat.length_squared() > NO_DIRECTION * vector.length_squared()).then(|| flat.to_angle())
     }
 }
 
@@ -108,9 +113,9 @@ fn side(corners: &[DVec2; 3], i: usize) -> DVec2 {
     corners[(i + 1) % 3] - corners[i]
 }
 
-/// The planar triangle of given side lengths, all triangle inequalities strict.
+/// The planar triangle with these side lengths, which satisfy the triangle inequalities strictly.
 fn lay_out([a, b, c]: [f64; 3]) -> [DVec2; 3] {
-    // Area by the sorted form of Heron's formula, which keeps its digits for thin triangles (Kahan).
+    // Kahan's form of Heron's formula with sorted sides, which is accurate for thin triangles.
     let mut s = [a, b, c];
     s.sort_by(|p, q| q.total_cmp(p));
     let [l, m, n] = s;

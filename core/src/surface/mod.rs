@@ -1,24 +1,34 @@
-//! A checked mesh made ready for geometry processing, and the curves that are drawn on it.
+//! Geometry on a triangle mesh: points, curves, geodesics, curvature, nearest points and rays.
+//!
+//! A curve is the list of mesh edges that it crosses ([`SurfaceCurve`]); [`relax`](fn@relax) smooths it within its
+//! homotopy class.
 
+mod barycentric;
 mod curvature;
 mod curve;
+mod funnel;
+mod geodesic;
 mod index;
 mod metric;
-mod path;
 mod point;
 mod relax;
 mod shape_operator;
+mod tangent_tensor;
+#[cfg(test)]
+pub(crate) mod testing;
 mod trace_geodesic;
+mod vertex_fan;
+mod vertex_path;
 
+pub use barycentric::{barycentric, barycentric_inside};
 pub use curvature::{PrincipalCurvature, principal_curvature};
 pub use curve::{Crossing, CurveError, SurfaceCurve};
+pub use geodesic::geodesic_in;
 pub use index::SurfaceIndex;
 pub(crate) use index::nearest_in_triangle;
 pub use metric::Metric;
-pub use path::{VertexPath, geodesic_in};
 pub use point::SurfacePoint;
-#[cfg(test)]
-pub(crate) use relax::testing;
 pub use relax::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
 pub use shape_operator::{face_curvature, second_fundamental_form};
 pub use trace_geodesic::{GeodesicTrace, PolarMap, trace_geodesic};
+pub use vertex_path::VertexPath;

@@ -10,18 +10,18 @@ use crate::mesh::{FaceId, TriMesh, VertexId};
 pub struct SurfacePoint {
     /// The triangle.
     pub face: FaceId,
-    /// Weights of the triangle's three corners; not negative, of sum 1.
+    /// Barycentric coordinates in the triangle, in the order of its corners; not negative, sum 1.
     pub weights: [f64; 3],
 }
 
 impl SurfacePoint {
-    /// The position in space.
+    /// Position in space, in units of the mesh.
     pub fn position(&self, mesh: &TriMesh) -> DVec3 {
         let corners = mesh.face_vertices(self.face);
         corners.iter().zip(self.weights).map(|(&v, w)| mesh.position(v) * w).sum()
     }
 
-    /// The corner of the triangle that weighs most.
+    /// The corner of the triangle with the largest weight; of equal ones the first.
     pub fn nearest_vertex(&self, mesh: &TriMesh) -> VertexId {
         let corners = mesh.face_vertices(self.face);
         let mut best = 0;

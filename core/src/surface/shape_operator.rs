@@ -1,14 +1,19 @@
-//! How each triangle's surroundings bend: the shape tensors of its corners, turned into its plane and averaged.
+//! Principal curvatures of triangles, from those of their corners.
+//!
+//! The shape operator of each corner, a symmetric tensor in its tangent plane, is rotated into the plane of the
+//! triangle. The shape operator of the triangle is the mean of its corners'.
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::curvature::PrincipalCurvature;
+use super::tangent_tensor::{outer, plane_eigen};
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::surface::PrincipalCurvature;
 
-/// Principal curvatures of every triangle, with directions in its plane: the average over those of its corners that
-/// `counts` accepts, without bend where there are none. `curvature` has an entry per vertex.
+/// Principal curvatures of every triangle, with directions in its plane.
 ///
-/// Each tensor is turned with its normal onto the triangle's, so that curvatures are kept however steep the turn.
+/// `curvature` has one entry per vertex. The result is the mean over those corners for which `counts` is true; both
+/// curvatures are 0 where there are none. Each corner's tensor is turned by the smallest rotation that takes its normal
+/// to the triangle's, so that curvatures keep their size however large the angle between the normals is.
 pub fn face_curvature(
     mesh: &TriMesh,
     curvature: &[PrincipalCurvature],
@@ -18,7 +23,7 @@ pub fn face_curvature(
         let normal = mesh.face_normal(f);
         let corners = mesh.face_vertices(f).into_iter().filter(|&v| counts(v));
         let (sum, n) =
-            corners.fold((DMat3::ZERO, 0.0), |(sum, n), v| (sum + turned(&curvature[v.index()], normal), n + 1.0));
+            corners.fold((DMat3::ZERO, 0.0), |(sum, n), v| (sum + rotated(&curvature[v.index()], normal), n + 1.0));
         principal(if n > 0.0 { sum * (1.0 / n) } else { sum }, normal)
     };
     mesh.faces().map(average).collect()
@@ -29,39 +34,31 @@ pub fn second_fundamental_form(c: &PrincipalCurvature, a: DVec3, b: DVec3) -> f6
     c.k_min * a.dot(c.d_min) * b.dot(c.d_min) + c.k_max * a.dot(c.d_max) * b.dot(c.d_max)
 }
 
-/// The shape tensor after the smallest turn that takes its normal to `normal`.
-fn turned(c: &PrincipalCurvature, normal: DVec3) -> DMat3 {
+/// The shape operator after the smallest rotation that takes its normal to `normal`.
+fn rotated(c: &PrincipalCurvature, normal: DVec3) -> DMat3 {
     let own = c.d_min.cross(c.d_max);
     let side = if own.dot(normal) < 0.0 { -own } else { own };
+    // A degenerate triangle has no normal.
     let turn = if normal == DVec3::ZERO { DQuat::IDENTITY } else { DQuat::from_rotation_arc(side, normal) };
     let (a, b) = (turn * c.d_min, turn * c.d_max);
     outer(a) * c.k_min + outer(b) * c.k_max
 }
 
-fn outer(e: DVec3) -> DMat3 {
-    DMat3::from_cols(e * e.x, e * e.y, e * e.z)
-}
-
-/// Eigenvalues and directions of a tensor in the plane with normal `n`; any plane where the triangle has none.
+/// Principal curvatures of a shape operator in the plane with normal `n`; in any plane where the triangle has none.
 fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
     let n = if n == DVec3::ZERO { DVec3::Z } else { n };
-    let (x, y) = n.any_orthonormal_pair();
-    let (a, b, c) = (x.dot(tensor * x), x.dot(tensor * y), y.dot(tensor * y));
-    let (mean, difference) = (0.5 * (a + c), 0.5 * (a - c));
-    let root = difference.hypot(b);
-    let angle = 0.5 * b.atan2(difference);
-    let along = x * angle.cos() + y * angle.sin();
-    PrincipalCurvature { k_min: mean - root, k_max: mean + root, d_min: n.cross(along), d_max: along }
+    let eigen = plane_eigen(tensor, n);
+    PrincipalCurvature { k_min: eigen.low, k_max: eigen.high, d_min: n.cross(eigen.axis), d_max: eigen.axis }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::curvature::principal_curvature;
     use super::*;
-    use crate::surface::principal_curvature;
     use crate::testing::torus;
 
     #[test]
-    fn a_torus_bends_in_its_triangles_as_at_its_vertices() {
+    fn triangles_of_a_torus_have_the_curvatures_of_the_torus() {
         let mesh = torus(120, 60);
         let at = principal_curvature(&mesh, 0.03, &vec![false; mesh.n_edges()]);
         for (f, c) in mesh.faces().zip(face_curvature(&mesh, &at, |_| true)) {

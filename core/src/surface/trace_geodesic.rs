@@ -1,28 +1,29 @@
-//! Straightest geodesics (Polthier and Schmies, Straightest Geodesics on Polyhedral Surfaces).
+//! Straightest geodesics from a vertex (Polthier and Schmies, Straightest Geodesics on Polyhedral Surfaces).
 //!
-//! From a vertex in a direction, straight through each triangle and straight on, unfolded, into the next. Directions at
-//! the vertex are those of the geodesic polar map (Welch and Witkin): angles between its edges are scaled by one factor
-//! so that they sum to a full turn (half a turn at the boundary).
+//! The geodesic is a straight segment in each triangle and continues straight into the next one, unfolded. Directions
+//! at the vertex are those of the geodesic polar map (Welch and Witkin): the angles between its edges are scaled by one
+//! factor so that they sum to 2π (π at the boundary).
 
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use super::SurfacePoint;
+use super::metric::Metric;
+use super::point::SurfacePoint;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::surface::Metric;
 
-/// How close to a corner, as a fraction of the edge, a trace may pass: it is moved aside rather than end there.
-const CLEAR: f64 = 1e-6;
+/// Least distance of a crossing from the ends of its edge, as a fraction of the edge. A geodesic that would run into a
+/// vertex passes beside it.
+const CORNER_CLEARANCE: f64 = 1e-6;
 
-/// The polar map of a vertex' ring of triangles.
+/// The geodesic polar map of the triangles around a vertex.
 #[derive(Debug, Clone)]
 pub struct PolarMap {
-    /// The outgoing half-edges, counter-clockwise, each with the polar angle of its direction; the first is at 0.
+    /// The outgoing half-edges, counter-clockwise, each with its polar angle in radians; the first is at 0.
     pub spokes: Vec<(HalfedgeId, f64)>,
-    /// By what the angles of the surface are multiplied.
+    /// Polar angle per angle on the surface.
     pub scale: f64,
-    /// The polar angle at which the last triangle ends: a full turn, or half a turn at the boundary.
+    /// The polar angle at which the last triangle ends: 2π, or π at the boundary.
     pub total: f64,
 }
 
@@ -44,7 +45,8 @@ impl PolarMap {
         Self { spokes, scale, total }
     }
 
-    /// The half-edge whose triangle lies in polar direction `angle`, and the angle on the surface from it.
+    /// The outgoing half-edge whose triangle contains polar direction `angle`, and the angle on the surface from this
+    /// half-edge, in radians.
     pub fn wedge(&self, angle: f64) -> (HalfedgeId, f64) {
         let angle = if self.total < TAU { angle.clamp(0.0, self.total) } else { angle.rem_euclid(TAU) };
         let at = self.spokes.partition_point(|s| s.1 <= angle).max(1) - 1;
@@ -56,26 +58,27 @@ impl PolarMap {
 /// A traced geodesic.
 #[derive(Debug, Clone)]
 pub struct GeodesicTrace {
-    /// Where it ends.
+    /// The end point.
     pub end: SurfacePoint,
-    /// The half-edges it crosses, each of the triangle that is left.
+    /// The half-edges crossed, each in the triangle that the geodesic leaves.
     pub crossed: Vec<HalfedgeId>,
     /// The first triangle.
     pub first: FaceId,
-    /// Whether it was stopped by the boundary before it had its length.
+    /// Whether the boundary ended it before it had the requested length.
     pub hit_boundary: bool,
 }
 
-/// Traces from `v` in polar direction `angle` for `length`, stopping at the boundary.
+/// Traces a geodesic from `v` in polar direction `angle` (radians) over `length` (units of the mesh), or up to the
+/// boundary.
 pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, length: f64) -> GeodesicTrace {
     let (start, turn) = PolarMap::new(mesh, metric, v).wedge(angle);
     let first = mesh.face(start);
     let mut face = first;
     let mut at = metric.layout(face)[start.index() % 3];
     let mut heading = metric.direction(start) + turn;
-    let mut left = length;
+    let mut remaining = length;
     let mut crossed = Vec::new();
-    // The side that must not be left through at once: none at the start but those at the vertex itself.
+    // The side through which the triangle was entered. In the first triangle only the side opposite to `v` is an exit.
     let mut entry: Option<usize> = None;
     loop {
         let corners = metric.layout(face);
@@ -86,18 +89,23 @@ pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, 
             .filter_map(|i| {
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
                 let away = direction.perp_dot(b - a);
-                // Leaving means passing the side from its left to its right.
+                // The geodesic leaves where it crosses a side from left to right: `away > 0`.
                 let t = (a - at).perp_dot(direction) / away;
                 let s = (a - at).perp_dot(b - a) / away;
-                (away > 0.0 && s.is_finite() && t.is_finite()).then_some((i, s.max(0.0), t.clamp(CLEAR, 1.0 - CLEAR)))
+                (away > 0.0 && s.is_finite() && t.is_finite()).then_some((
+                    i,
+                    s.max(0.0),
+                    t.clamp(CORNER_CLEARANCE, 1.0 - CORNER_CLEARANCE),
+                ))
             })
             .min_by(|p, q| p.1.total_cmp(&q.1));
         let Some((side, s, t)) = exit else {
-            return GeodesicTrace { end: point(metric, face, at), crossed, first, hit_boundary: true };
+            return GeodesicTrace { end: surface_point(metric, face, at), crossed, first, hit_boundary: true };
         };
-        if s >= left || crossed.len() > mesh.n_faces() {
+        // The second condition is a safeguard: rounding must not keep the loop going.
+        if s >= remaining || crossed.len() > mesh.n_faces() {
             return GeodesicTrace {
-                end: point(metric, face, at + left * direction),
+                end: surface_point(metric, face, at + remaining * direction),
                 crossed,
                 first,
                 hit_boundary: false,
@@ -106,9 +114,9 @@ pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, 
         let h = mesh.face_halfedges(face)[side];
         let Some(twin) = mesh.twin(h) else {
             let end = corners[side].lerp(corners[(side + 1) % 3], t);
-            return GeodesicTrace { end: point(metric, face, end), crossed, first, hit_boundary: true };
+            return GeodesicTrace { end: surface_point(metric, face, end), crossed, first, hit_boundary: true };
         };
-        left -= s;
+        remaining -= s;
         heading += metric.transport(h, twin);
         crossed.push(h);
         face = mesh.face(twin);
@@ -118,8 +126,8 @@ pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, 
     }
 }
 
-/// A point of a triangle's layout as a surface point, within the triangle.
-fn point(metric: &Metric, face: FaceId, at: DVec2) -> SurfacePoint {
+/// A point given in a triangle's planar layout, clamped to the triangle.
+fn surface_point(metric: &Metric, face: FaceId, at: DVec2) -> SurfacePoint {
     let [a, b, c] = *metric.layout(face);
     let area = (b - a).perp_dot(c - a);
     let weights = [(c - b).perp_dot(at - b), (a - c).perp_dot(at - c), (b - a).perp_dot(at - a)];
@@ -147,7 +155,7 @@ mod tests {
             let angle = TAU * (f64::from(k) + 0.3) / 50.0;
             let trace = trace_geodesic(&mesh, &metric, v, angle, 0.4);
             let want = mesh.position(v) + 0.4 * DVec3::new((angle + first).cos(), (angle + first).sin(), 0.0);
-            // The metric is enlarged by a ten-thousandth of an edge.
+            // `Metric` lengthens edges by a ten-thousandth of the mean.
             assert!(trace.end.position(&mesh).distance(want) < 1e-3, "{k}");
             assert!(!trace.hit_boundary);
             let last = trace.crossed.last().map_or(trace.first, |&h| mesh.face(mesh.twin(h).unwrap()));
@@ -166,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn around_a_cylinder_it_comes_back_to_its_height() {
+    fn around_a_cylinder_a_geodesic_returns_to_its_height() {
         let mesh = grid(24, 8, [true, false], |u, v| DVec3::new((TAU * u).cos(), (TAU * u).sin(), 2.0 * v));
         let metric = Metric::new(&mesh);
         let v = VertexId(24 * 4);

@@ -1,4 +1,4 @@
-//! The document: which mesh, which options, which strips in which order.
+//! The design, the document of the program: mesh, options, strips in order, pins.
 
 use std::path::{Path, PathBuf};
 
@@ -7,27 +7,37 @@ use thiserror::Error;
 
 use crate::mesh::{MeshSource, TriMesh, fingerprint};
 use crate::surface::SurfaceCurve;
-use crate::weave::model::Options;
-use crate::weave::proposal::ElasticEnergy;
+use crate::weave::options::Options;
 
-/// Number of a strip, never used again within one design.
+/// Number of a strip, unique within a design and never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct StripId(pub u32);
+
+/// Elastic energy of a loop: its length plus weighted squared curvature (8.2), without alignment. Relaxation lowers it within
+/// a tube around the loop found; alignment only steered the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ElasticEnergy {
+    /// Of the loop as found, in steps of the graph.
+    pub found: f64,
+    /// Of the relaxed curve on the surface; equal to `found` until it is relaxed.
+    #[serde(rename = "now")]
+    pub relaxed: f64,
+}
 
 /// A placed strip.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Strip {
     /// Its number.
     pub id: StripId,
-    /// Its spine, on the mesh of the design.
+    /// Its spine on the design mesh.
     pub curve: SurfaceCurve,
-    /// The same on the proxy it was woven on, if it was.
+    /// Its spine on the proxy, if it was woven on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub on_proxy: Option<SurfaceCurve>,
-    /// Cost of the loop when it was found.
+    /// Elastica cost of the loop as it was found.
     pub cost: f64,
-    /// Its elastic energy when it was placed, if it was a loop of the graph.
+    /// Its elastic energy as placed, if it was a loop of the elastica graph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<ElasticEnergy>,
     /// Whether it is drawn.
@@ -35,14 +45,14 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// Its spine on the mesh that is woven on.
+    /// Its spine on the woven mesh.
     pub fn woven(&self) -> &SurfaceCurve {
         self.on_proxy.as_ref().unwrap_or(&self.curve)
     }
 }
 
-/// A part of the layout that is to stay where it is when the embedding is optimised. It is told by a point of the first
-/// drawing of the layout, which is the same for the same strips, on the mesh of bounding-box diagonal 1.
+/// A part of the layout that keeps its position when the embedding is optimised. It is identified by a point of the initial
+/// embedding, which is the same for the same strips; coordinates are those of the normalised mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pin {
@@ -75,7 +85,7 @@ pub enum DesignError {
     #[error("the design has format version {0}; this program reads up to {VERSION}")]
     Version(u32),
     /// The mesh is not the one that the design was made on.
-    #[error("the mesh {mesh} is not the one this design was made on (it has changed since)")]
+    #[error("the mesh {mesh} differs from the one that this design was made on")]
     OtherMesh {
         /// Where it was read.
         mesh: String,
@@ -85,23 +95,23 @@ pub enum DesignError {
 /// Version of the file format.
 const VERSION: u32 = 1;
 
-/// A design: a value that commands transform.
+/// A design: a plain value that a session transforms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Design {
     /// Version of the format.
     pub version: u32,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
-    /// Fingerprint of the mesh, to notice when it has changed.
+    /// Fingerprint of the design mesh, to detect that it has changed.
     pub fingerprint: String,
     /// The options.
     pub options: Options,
-    /// Fingerprint of the proxy that strips were woven on, to notice when another program makes another one.
+    /// Fingerprint of the proxy that strips were woven on, to detect that another version builds another proxy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proxy: Option<String>,
     /// The strips in the order placed.
     pub strips: Vec<Strip>,
-    /// What of their layout is to stay where it is.
+    /// Nodes and arcs of the layout that keep their positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<Pin>,
 }
@@ -117,7 +127,7 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// When there is no such file, or it is no design, or a newer one.
+    /// When the file cannot be read, is not a design, or has a newer version.
     pub fn read(path: &Path) -> Result<Self, DesignError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| DesignError::File { path: path.to_owned(), source })?;
@@ -141,7 +151,7 @@ impl Design {
         std::fs::write(path, text + "\n").map_err(file)
     }
 
-    /// Checks that `mesh` is the one the design was made on and that all strips lie on it.
+    /// Checks that `mesh` is the one that the design was made on and that all strips lie on it.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
-//! A session's layout on the surface: its first drawing, what of it is pinned, and its optimisation.
+//! The layout of a session on the surface: its initial embedding, its pinned parts, and its optimisation.
 
 use glam::DVec3;
 
-use crate::dual::{Arrangement, Colour, RegionReport, assess, remove_bigons, vertex_curvatures};
+use crate::dual::{Arrangement, RegionReport, assess, remove_bigons, vertex_curvatures};
 use crate::embed::{EmbeddingError, Next, OptimisedEmbedding, Problem, Settings, Snapshot, arc_headings};
 use crate::layout::{Embedding, Part, QuadLayout, embed};
 use crate::mesh::{FaceId, TriMesh, VertexId};
@@ -10,32 +10,33 @@ use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
 use crate::weave::design::Pin;
 use crate::weave::error::WeaveError;
-use crate::weave::mesh_role::{MeshRole, alike};
+use crate::weave::mesh_role::{MeshRole, same_regions};
 use crate::weave::model::{Model, features};
 use crate::weave::session::Session;
+use crate::weave::woven::red_regions;
 
-/// A layout and a drawing of it.
+/// A layout with its initial embedding.
 #[derive(Debug, Clone)]
 pub struct InitialLayout {
     /// Its structure.
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
-    /// The mesh that they are drawn on.
+    /// The mesh that they are on.
     pub mesh_role: MeshRole,
 }
 
 /// Which nodes and arcs are pinned.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PinnedParts {
-    /// One for each node.
+    /// For each node.
     pub nodes: Vec<bool>,
-    /// One for each arc.
+    /// For each arc.
     pub arcs: Vec<bool>,
 }
 
 impl PinnedParts {
-    /// Pins these nodes and arcs too.
+    /// Pins further nodes and arcs.
     ///
     /// # Errors
     ///
@@ -51,12 +52,12 @@ impl PinnedParts {
     }
 }
 
-/// Triangles up to which a mesh that is woven on a proxy has the layout embedded on itself; beyond, the optimisation takes
-/// minutes and gigabytes for what quads much larger than the triangles do not show.
-const EMBEDDED: usize = 150_000;
+/// Largest design mesh with a proxy, in triangles, that the layout is embedded on itself. On larger ones the optimisation
+/// takes minutes and gigabytes, and quads much larger than the triangles do not show the difference.
+const MAX_DESIGN_FACES: usize = 150_000;
 
-/// The layout of a session in its first drawing. With a proxy it is drawn on the mesh of the design where the strips make
-/// the same layout there and the mesh is not too large, and else on the proxy.
+/// The layout of a session with its initial embedding. With a proxy, it is embedded on the design mesh if that is not larger
+/// than [`MAX_DESIGN_FACES`] and the strips have the same layout there, and else on the proxy.
 ///
 /// # Errors
 ///
@@ -64,70 +65,92 @@ const EMBEDDED: usize = 150_000;
 pub fn initial_layout(session: &Session, progress: &Progress) -> Result<InitialLayout, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
     if model.proxy.is_some()
-        && model.loaded.mesh.n_faces() <= EMBEDDED
+        && model.loaded.mesh.n_faces() <= MAX_DESIGN_FACES
         && woven.red().is_empty()
-        && let Some(drawn) = initial_layout_on_design(session, progress)?
+        && let Some(initial) = initial_layout_on_design(session, progress)?
     {
-        return Ok(drawn);
+        return Ok(initial);
     }
     initial_layout_as_woven(session, progress)
 }
 
-/// The drawing on the mesh that is woven on.
+/// The layout with its initial embedding on the woven mesh.
 pub(in crate::weave) fn initial_layout_as_woven(
     session: &Session,
     progress: &Progress,
 ) -> Result<InitialLayout, WeaveError> {
     let (model, woven) = (session.model(), session.woven());
-    let layout = QuadLayout::dual(&woven.arrangement, &woven.red(), model.mesh.euler_characteristic())?;
-    progress.report("Drawing nodes and arcs", 0.1);
-    let (sharp, curved) = (&model.sharp, &model.vertex_curvatures);
-    let preferred = preferred_nodes(&woven.arrangement, &layout, &woven.reports, &model.mesh, sharp, curved);
-    let embedding = embed(&woven.arrangement, &layout, &preferred, progress)?;
-    let mesh_role = if model.proxy.is_some() { MeshRole::Proxy } else { MeshRole::Design };
-    Ok(InitialLayout { layout, embedding, mesh_role })
+    progress.report("Embedding nodes and arcs", 0.1);
+    let place = Place { mesh: &model.mesh, sharp: &model.sharp, vertex_curvatures: &model.vertex_curvatures };
+    let (layout, embedding) = embedded_dual(&woven.arrangement, &woven.reports, place, progress)?;
+    Ok(InitialLayout { layout, embedding, mesh_role: model.woven_role() })
 }
 
-/// The drawing on the mesh of the design; `None` where the strips, carried there, do not make the same layout.
+/// The layout with its initial embedding on the design mesh; `None` where the strips have another arrangement there.
 fn initial_layout_on_design(session: &Session, progress: &Progress) -> Result<Option<InitialLayout>, WeaveError> {
     let (model, mesh) = (session.model(), &session.model().loaded.mesh);
-    progress.report("Arranging strips on the whole mesh", 0.02);
+    progress.report("Arranging strips on the design mesh", 0.02);
     let Some(arrangement) = arranged_on_design(session, progress)? else {
-        tracing::warn!("the strips make another layout on the mesh than on the proxy: embedded on the proxy");
+        tracing::warn!("the strips have another layout on the design mesh: embedded on the proxy");
         return Ok(None);
     };
     progress.check()?;
-    let curved = vertex_curvatures(mesh);
-    let reports = assess(&arrangement, &curved, &corners_on_design(model));
-    let red: Vec<u32> = (0..reports.len() as u32).filter(|&r| reports[r as usize].colour == Colour::Red).collect();
-    let layout = QuadLayout::dual(&arrangement, &red, mesh.euler_characteristic())?;
-    progress.report("Drawing nodes and arcs", 0.1);
+    let vertex_curvatures = vertex_curvatures(mesh);
+    let reports = assess(&arrangement, &vertex_curvatures, &corners_on_design(model));
+    progress.report("Embedding nodes and arcs", 0.1);
     let sharp = features(mesh, &model.options);
-    let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &sharp, &curved);
-    let embedding = embed(&arrangement, &layout, &preferred, progress)?;
+    let place = Place { mesh, sharp: &sharp, vertex_curvatures: &vertex_curvatures };
+    let (layout, embedding) = embedded_dual(&arrangement, &reports, place, progress)?;
     Ok(Some(InitialLayout { layout, embedding, mesh_role: MeshRole::Design }))
 }
 
-/// The arrangement on the mesh of the design that is like the one on the proxy, if there is one: of the strips as they were
-/// carried one by one, or else as they are drawn beside each other now.
+/// A mesh with what places nodes on it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::weave) struct Place<'a> {
+    pub mesh: &'a TriMesh,
+    /// Whether each edge is a sharp feature.
+    pub sharp: &'a [bool],
+    /// Contribution of each vertex to the total curvature.
+    pub vertex_curvatures: &'a [f64],
+}
+
+/// The layout dual to an arrangement, and its initial embedding.
+///
+/// # Errors
+///
+/// [`crate::layout::LayoutError::RedRegions`] if a region is red, or why there is no embedding.
+pub(in crate::weave) fn embedded_dual(
+    arrangement: &Arrangement,
+    reports: &[RegionReport],
+    place: Place<'_>,
+    progress: &Progress,
+) -> Result<(QuadLayout, Embedding), WeaveError> {
+    let layout = QuadLayout::dual(arrangement, &red_regions(reports), place.mesh.euler_characteristic())?;
+    let preferred = preferred_nodes(arrangement, &layout, reports, place);
+    let embedding = embed(arrangement, &layout, &preferred, progress)?;
+    Ok((layout, embedding))
+}
+
+/// An arrangement on the design mesh with the same regions as the one on the proxy, if there is one: of the strips' curves on
+/// the design mesh, or else of their edge paths in the arrangement on the proxy, transferred to the design mesh.
 fn arranged_on_design(session: &Session, progress: &Progress) -> Result<Option<Arrangement>, WeaveError> {
     let (mesh, woven) = (&session.model().loaded.mesh, &session.woven().arrangement);
-    let like = |mut curves: Vec<SurfaceCurve>| {
+    let same = |mut curves: Vec<SurfaceCurve>| {
         remove_bigons(mesh, &mut curves);
-        Arrangement::new(mesh, &curves).ok().filter(|a| alike(a, woven))
+        Arrangement::new(mesh, &curves).ok().filter(|a| same_regions(a, woven))
     };
     let placed: Vec<SurfaceCurve> = session.design().strips.iter().map(|s| s.curve.clone()).collect();
     let count = placed.len();
-    if let Some(arrangement) = like(placed) {
+    if let Some(arrangement) = same(placed) {
         return Ok(Some(arrangement));
     }
     progress.check()?;
-    let drawn: Option<Vec<SurfaceCurve>> = (0..count).map(|i| drawn_on_design(session, i)).collect();
-    Ok(drawn.and_then(like))
+    let transferred: Option<Vec<SurfaceCurve>> = (0..count).map(|i| transferred_path(session, i)).collect();
+    Ok(transferred.and_then(same))
 }
 
-/// A strip as it is drawn between the others on the proxy, on the mesh of the design.
-fn drawn_on_design(session: &Session, strip: usize) -> Option<SurfaceCurve> {
+/// The edge path of a strip in the arrangement on the proxy, as a curve on the design mesh.
+fn transferred_path(session: &Session, strip: usize) -> Option<SurfaceCurve> {
     let (model, arrangement) = (session.model(), &session.woven().arrangement);
     let refined = &arrangement.refined;
     let face = |h: u32| FaceId(refined.base_face(h / 3));
@@ -141,26 +164,24 @@ fn drawn_on_design(session: &Session, strip: usize) -> Option<SurfaceCurve> {
     model.proxy.as_ref()?.polyline_to_original(&model.loaded.mesh, &line, closed).ok()
 }
 
-/// The pronounced corners of the shape by vertices of the design's mesh.
+/// The pronounced corners of the shape as vertices of the design mesh.
 fn corners_on_design(model: &Model) -> Vec<(VertexId, i8)> {
     let vertex = |v| model.proxy.as_ref().map_or(v, |p| p.original_vertex(v));
     model.corners.iter().map(|&(v, index)| (vertex(v), index)).collect()
 }
 
-/// Where the node of each region is to lie: at its only pronounced corner, or where there is none, at that corner of its
-/// features which is `curved` most in the sense of the node.
-pub(in crate::weave) fn preferred_nodes(
+/// The preferred position of the node of each region: its only pronounced corner, or if it has none, the corner of features
+/// with the largest curvature of the sign of the node's index.
+fn preferred_nodes(
     arrangement: &Arrangement,
     layout: &QuadLayout,
     reports: &[RegionReport],
-    mesh: &TriMesh,
-    sharp: &[bool],
-    curved: &[f64],
+    place: Place<'_>,
 ) -> Vec<Option<VertexId>> {
-    let is_corner = feature_corners(mesh, sharp);
+    let is_corner = feature_corners(place.mesh, place.sharp);
     let of_features = |r: usize| {
-        let sense = 4.0 - layout.nodes[r].valence as f64;
-        let curved = |v: &VertexId| sense * curved[v.index()];
+        let index = 4.0 - layout.nodes[r].valence as f64;
+        let curved = |v: &VertexId| index * place.vertex_curvatures[v.index()];
         let faces = arrangement.regions[r].faces.iter();
         let corners = faces.flat_map(|&f| arrangement.refined.corners(f)).map(VertexId);
         let candidates = corners.filter(|v| is_corner.get(v.index()).copied().unwrap_or(false));
@@ -175,7 +196,7 @@ pub(in crate::weave) fn preferred_nodes(
     reports.iter().enumerate().map(of).collect()
 }
 
-/// Whether three or more sharp edges meet at each vertex.
+/// For each vertex whether three or more sharp edges meet there.
 fn feature_corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<bool> {
     let mut degree = vec![0; mesh.n_vertices()];
     for e in mesh.edges().filter(|e| sharp[e.index()]) {
@@ -186,19 +207,20 @@ fn feature_corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<bool> {
     degree.into_iter().map(|d| d > 2).collect()
 }
 
+/// Pins are identified by the initial embedding: none of these methods works on an optimised one.
 impl InitialLayout {
-    /// The pin that stands for a node; this must be the first drawing.
+    /// The pin of a node.
     pub fn node_pin(&self, node: usize) -> Option<Pin> {
         self.embedding.nodes.get(node).map(|&v| Pin::Node(self.position(v).to_array()))
     }
 
-    /// The pin that stands for an arc; this must be the first drawing.
+    /// The pin of an arc.
     pub fn arc_pin(&self, arc: usize) -> Option<Pin> {
         let middle = |path: &Vec<u32>| path.get(path.len() / 2).map(|&v| Pin::Arc(self.position(v).to_array()));
         self.embedding.arcs.get(arc).and_then(middle)
     }
 
-    /// The nodes and arcs that `pins` stand for: the nearest to each; this must be the first drawing.
+    /// The nodes and arcs of `pins`: the part nearest to each.
     pub fn pinned(&self, pins: &[Pin]) -> PinnedParts {
         let place = |pin: Option<Pin>| match pin {
             Some(Pin::Node(p) | Pin::Arc(p)) => DVec3::from_array(p),
@@ -220,7 +242,7 @@ impl InitialLayout {
         parts
     }
 
-    /// The pins that stand for these parts; this must be the first drawing.
+    /// The pins of these parts.
     pub fn pins(&self, parts: &PinnedParts) -> Vec<Pin> {
         let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
         let nodes = set(&parts.nodes).into_iter().filter_map(|i| self.node_pin(i));
@@ -233,29 +255,29 @@ impl InitialLayout {
     }
 }
 
-/// Optimises the embedding of a session's layout from a drawing of it on.
+/// Optimises the embedding of a session's layout, starting with an initial embedding.
 ///
 /// # Errors
 ///
 /// See [`EmbeddingError`].
 pub fn optimise(
     session: &Session,
-    drawn: &InitialLayout,
+    initial: &InitialLayout,
     pinned: &PinnedParts,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<OptimisedEmbedding, EmbeddingError> {
     let model = session.model();
-    let surface = model.surface(drawn.mesh_role);
-    let arc_headings = arc_headings(&drawn.layout);
-    let job = Problem {
+    let surface = model.surface(initial.mesh_role);
+    let arc_headings = arc_headings(&initial.layout);
+    let problem = Problem {
         surface,
-        layout: &drawn.layout,
-        initial_embedding: &drawn.embedding,
+        layout: &initial.layout,
+        initial_embedding: &initial.embedding,
         arc_headings: &arc_headings,
         pinned_nodes: &pinned.nodes,
         pinned_arcs: &pinned.arcs,
         settings: Settings::default(),
     };
-    crate::embed::optimise(&job, progress, watch)
+    crate::embed::optimise_embedding(&problem, progress, watch)
 }

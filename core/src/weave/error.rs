@@ -1,4 +1,4 @@
-//! What can go wrong while weaving.
+//! Errors of weaving.
 
 use thiserror::Error;
 
@@ -12,10 +12,10 @@ use crate::progress::Cancelled;
 use crate::proxy::CurveTransferError;
 use crate::weave::design::{DesignError, StripId};
 
-/// Whatever can go wrong while weaving.
+/// Why weaving failed.
 #[derive(Debug, Error)]
 pub enum WeaveError {
-    /// Stopped from outside.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// The search graph could not be built.
@@ -33,13 +33,13 @@ pub enum WeaveError {
     /// The design could not be read, written or replayed.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// A strip woven on a proxy has no counterpart on the mesh itself.
+    /// A strip on the proxy has no counterpart on the design mesh.
     #[error("the strip cannot be placed here: {0}")]
     Carry(#[from] CurveTransferError),
-    /// There is no valid layout yet.
+    /// The strips have no valid layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// The layout could not be embedded.
+    /// The layout has no initial embedding.
     #[error(transparent)]
     Embed(#[from] InitialEmbeddingError),
     /// The embedding could not be optimised.
@@ -51,11 +51,11 @@ pub enum WeaveError {
     /// A layout file could not be read or written.
     #[error(transparent)]
     LayoutFile(#[from] LayoutFileError),
-    /// The layout of a file cannot be drawn on its mesh.
+    /// The partial embedding of a layout file does not fit its mesh.
     #[error(transparent)]
     Draw(#[from] PartialEmbeddingError),
-    /// A layout that lacks arcs is completed by the optimisation only.
-    #[error("the layout lacks arcs; they only emerge when its embedding is optimised")]
+    /// The layout lacks arcs. Only the optimised map completes it.
+    #[error("the layout lacks arcs; optimising its embedding completes it")]
     Incomplete,
     /// There is no such node or arc.
     #[error("the layout has no {0}")]
@@ -63,10 +63,8 @@ pub enum WeaveError {
     /// No strip can be suggested.
     #[error(transparent)]
     NoSuggestion(#[from] NoSuggestion),
-    /// The strips do not fit the mesh that other options would weave on.
-    #[error(
-        "the strips placed make another layout on the surface with this detail; remove those on small relief first"
-    )]
+    /// The strips have another layout on the woven mesh of other options.
+    #[error("the placed strips have another layout at this level of detail; remove strips on small relief first")]
     Options,
     /// There is no such strip.
     #[error("there is no strip {}", .0.0)]
@@ -81,16 +79,16 @@ pub enum WeaveError {
     },
 }
 
-/// No strip can be suggested.
+/// Why no strip is suggested.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NoSuggestion {
-    /// Nothing is left to do.
+    /// The goal is reached.
     #[error("nothing is left to do")]
     Done,
-    /// No loop through any of the points tried helps.
+    /// No candidate improves any region that needs strips.
     #[error("no strip was found that helps with region {region} ({reason})")]
     NoHelp {
-        /// The region.
+        /// The most urgent region.
         region: u32,
         /// Its most urgent finding.
         reason: String,

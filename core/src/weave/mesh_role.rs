@@ -1,8 +1,8 @@
-//! Two meshes for one design: the one that is shown and written, and the one that is woven on.
+//! The two meshes of a model: the design mesh, which is shown and written, and the woven mesh.
 //!
-//! Where a model has no proxy they are the same, and nothing here costs anything. A point of the designer's goes to the
-//! proxy, a strip comes back to the mesh as a curve of the same class, and the layout is embedded on the mesh itself, if
-//! the strips make the same layout there.
+//! Without a proxy they are the same mesh, and all maps are the identity. With a proxy, points picked on the design mesh map
+//! to the proxy, strips map back as curves of the same homotopy class, and the layout is embedded on the design mesh if the
+//! strips have the same layout there.
 
 use glam::DVec3;
 
@@ -12,41 +12,46 @@ use crate::proxy::CurveTransferError;
 use crate::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint, principal_curvature};
 use crate::weave::model::Model;
 
-/// The mesh that a layout is drawn and embedded on.
+/// The mesh that a layout is embedded on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshRole {
-    /// That of the design.
+    /// The design mesh.
     Design,
-    /// The proxy that stands for it.
+    /// Its proxy.
     Proxy,
 }
 
 impl Model {
-    /// One of the two meshes with what the embedding needs of it; of a mesh with a proxy this is made when it is first
-    /// asked for.
+    /// One of the two meshes with the data that the embedding needs. For a design mesh with a proxy, and for the proxy's
+    /// index, they are computed on first use.
     pub fn surface(&self, mesh_role: MeshRole) -> Surface<'_> {
         let (mesh, curvature, sharp) = (&*self.mesh, &self.curvature[..], &self.sharp[..]);
         match (mesh_role, &self.proxy) {
             (_, None) => Surface { mesh, index: &self.index, curvature, sharp },
             (MeshRole::Proxy, Some(_)) => {
-                let index = self.own.proxy_index.get_or_init(|| SurfaceIndex::new(mesh));
+                let index = self.design_data.proxy_index.get_or_init(|| SurfaceIndex::new(mesh));
                 Surface { mesh, index, curvature, sharp }
             }
             (MeshRole::Design, Some(_)) => {
-                let (mesh, sharp) = (&*self.loaded.mesh, &self.own.sharp[..]);
+                let (mesh, sharp) = (&*self.loaded.mesh, &self.design_data.sharp[..]);
                 let radius = self.options.curvature_radius;
-                let curvature = self.own.curvature.get_or_init(|| principal_curvature(mesh, radius, sharp));
+                let curvature = self.design_data.curvature.get_or_init(|| principal_curvature(mesh, radius, sharp));
                 Surface { mesh, index: &self.index, curvature, sharp }
             }
         }
     }
 
-    /// The point of the mesh that is woven on for a point of the design's mesh.
+    /// The role of the woven mesh.
+    pub fn woven_role(&self) -> MeshRole {
+        if self.proxy.is_some() { MeshRole::Proxy } else { MeshRole::Design }
+    }
+
+    /// The point of the woven mesh for a point of the design mesh.
     pub fn to_woven(&self, at: SurfacePoint) -> SurfacePoint {
         self.proxy.as_ref().map_or(at, |proxy| proxy.to_proxy(&self.loaded.mesh, at))
     }
 
-    /// The curve on the design's mesh for a curve on the one that is woven on.
+    /// The curve on the design mesh for a curve on the woven mesh.
     ///
     /// # Errors
     ///
@@ -58,13 +63,13 @@ impl Model {
         }
     }
 
-    /// A curve on the mesh that is woven on as points in space on the design's mesh.
+    /// Points on the design mesh along a curve on the woven mesh.
     pub fn on_design_mesh(&self, curve: &SurfaceCurve) -> Vec<DVec3> {
         let Some(proxy) = &self.proxy else { return curve.points(&self.mesh) };
         let original = &self.loaded.mesh;
         match proxy.curve_to_original(original, curve) {
             Ok(carried) => carried.points(original),
-            // Where it has no counterpart, its points still have.
+            // The curve may have no counterpart, but each of its points has.
             Err(_) => {
                 let point = |i| proxy.to_original(original, curve.surface_point(&self.mesh, i)).position(original);
                 (0..curve.crossings.len()).map(point).collect()
@@ -73,23 +78,25 @@ impl Model {
     }
 }
 
-/// A side of a region, whatever mesh it is drawn on: the curve it belongs to, and whether it is passed forward.
-type Name = (u8, u32);
+/// A side of a region independently of the mesh: its kind (segment, ring, boundary) and its curve.
+type SideLabel = (u8, u32);
 
-/// Whether two arrangements of the same curves, on two meshes, have the same regions with the same sides in order.
-pub(in crate::weave) fn alike(a: &Arrangement, b: &Arrangement) -> bool {
-    a.crossings.len() == b.crossings.len() && a.regions.len() == b.regions.len() && names(a) == names(b)
+/// Whether two arrangements of the same curves on two meshes have equally many crossings and the same regions: the same
+/// Euler characteristics, and borders with the same sides in the same cyclic order.
+pub(in crate::weave) fn same_regions(a: &Arrangement, b: &Arrangement) -> bool {
+    a.crossings.len() == b.crossings.len() && a.regions.len() == b.regions.len() && region_labels(a) == region_labels(b)
 }
 
-/// Every region by its Euler characteristic and the names of the sides of its borders, in an order of their own.
-fn names(arrangement: &Arrangement) -> Vec<(i64, Vec<Vec<Name>>)> {
+/// The Euler characteristic of every region and the labels of the sides of its borders, sorted.
+fn region_labels(arrangement: &Arrangement) -> Vec<(i64, Vec<Vec<SideLabel>>)> {
     let side = |s: &Side| match s.kind {
         SideKind::Segment { segment, .. } => (0, arrangement.segments[segment as usize].curve),
         SideKind::Ring { segment } => (1, arrangement.segments[segment as usize].curve),
         SideKind::Boundary => (2, 0),
     };
     let region = |r: &Region| {
-        let mut borders: Vec<Vec<Name>> = r.borders.iter().map(|b| first_turn(b.iter().map(side).collect())).collect();
+        let mut borders: Vec<Vec<SideLabel>> =
+            r.borders.iter().map(|b| least_rotation(b.iter().map(side).collect())).collect();
         borders.sort_unstable();
         (r.euler, borders)
     };
@@ -98,8 +105,8 @@ fn names(arrangement: &Arrangement) -> Vec<(i64, Vec<Vec<Name>>)> {
     all
 }
 
-/// Of all turns of a cycle the one that comes first.
-fn first_turn(cycle: Vec<Name>) -> Vec<Name> {
-    let turned = |k: usize| [&cycle[k..], &cycle[..k]].concat();
-    (0..cycle.len()).map(turned).min().unwrap_or_default()
+/// The lexicographically least rotation of a cycle.
+fn least_rotation(cycle: Vec<SideLabel>) -> Vec<SideLabel> {
+    let rotated = |k: usize| [&cycle[k..], &cycle[..k]].concat();
+    (0..cycle.len()).map(rotated).min().unwrap_or_default()
 }

@@ -1,7 +1,8 @@
-//! Interactive and unattended weaving: the document, proposals, suggestions, scripts and export.
+//! Interactive and unattended weaving: designs, proposals, suggestions, scripts and export.
 //!
-//! Everything above the geometry and below the window. A [`Model`] is a mesh made ready once; a [`Design`] is
-//! the document, a plain value; a [`Session`] holds both together with what is derived from them.
+//! A [`Model`] is a mesh prepared once. A [`Design`] is the document, a plain value with the placed strips. A [`Session`]
+//! holds a model, a design and its history, together with the arrangement of the strips ([`Woven`]). Searches for strips
+//! are in `search`, what is written in `export`, what only a window shows in `preview`.
 
 mod design;
 mod embedding;
@@ -11,6 +12,8 @@ mod loop_contacts;
 mod mesh_role;
 mod model;
 mod opened_layout;
+mod options;
+mod preview;
 mod proposal;
 mod recent;
 mod script;
@@ -20,17 +23,21 @@ mod session;
 mod tests;
 mod woven;
 
-pub use design::{Design, DesignError, Pin, Strip, StripId};
+pub use design::{Design, DesignError, ElasticEnergy, Pin, Strip, StripId};
 pub use embedding::{InitialLayout, PinnedParts, initial_layout, optimise};
 pub use error::{NoSuggestion, WeaveError};
-pub use export::files::{
-    CollapseLength, EmbeddingInput, Export, ExportOptions, QuadSize, Watch, export, finish, write_all,
-};
-pub use export::report::{Before, Times};
+pub use export::input::{CollapseLength, EmbeddingInput, ExportOptions, QuadSize, Watch};
+pub use export::refine::embed_and_refine;
+pub use export::result::{Export, InitialState, Times};
+pub use export::session_export::{export, write_all};
 pub use mesh_role::MeshRole;
-pub use model::{Model, Options};
+pub use model::Model;
 pub use opened_layout::OpenedLayout;
-pub use proposal::{ElasticEnergy, Proposal};
+pub use options::Options;
+pub use preview::arc_polylines::{embedding_polylines, move_ends, smoothed_polyline};
+pub use preview::design_overlay::{FacePieces, refined_corners};
+pub use preview::face_distortion::{FaceDistortion, face_distortion, largest_aspect};
+pub use proposal::Proposal;
 pub use script::{Script, ScriptError, Step, replay};
 pub use search::fit::Fit;
 pub use search::improve::{IMPROVEMENT_ROUNDS, Improvement};

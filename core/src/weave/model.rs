@@ -1,117 +1,74 @@
-//! A mesh made ready for weaving: everything that depends on the mesh and the options alone.
+//! A mesh prepared for weaving: everything that depends on the mesh and the options alone.
 //!
-//! A large mesh is woven on a proxy: features, curvature, corners and search graph are those of the proxy. What only the
-//! embedding needs of the mesh itself is made when it is asked for; see `ground`.
+//! The *design mesh* is the mesh as loaded. The *woven mesh* is the one that strips are woven on: the design mesh, or the
+//! proxy of a large one. Features, curvature, corners and the search graph are those of the woven mesh. What the embedding
+//! needs of a design mesh that has a proxy is computed on demand ([`DesignMeshData`]).
 
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use crate::dual::vertex_curvatures;
 use crate::elastica::{ElasticaGraph, ElasticaOptions};
-use crate::field::{AlignmentDirections, feature_aligned_field, pronounced};
-use crate::mesh::{
-    LoadedMesh, SHARP_DIHEDRAL, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges,
-};
+use crate::field::{AlignmentDirections, cancel_opposite_pairs, feature_aligned_field};
+use crate::mesh::{LoadedMesh, SHORT_FEATURE, Topology, TriMesh, VertexId, drop_short_features, sharp_edges};
 use crate::progress::{Cancelled, Progress};
 use crate::proxy::{Proxy, ProxyError};
-use crate::surface::Metric;
-use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
+use crate::surface::{Metric, PrincipalCurvature, SurfaceIndex, principal_curvature};
 use crate::weave::error::WeaveError;
+use crate::weave::options::Options;
 
-/// What the designer may set.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Options {
-    /// Radius of the ball over which curvature is taken, as a fraction of the bounding-box diagonal: smaller
-    /// relief does not guide strips.
-    pub curvature_radius: f64,
-    /// Dihedral angle above which an edge is sharp, in radians.
-    pub sharp_dihedral: f64,
-    /// Whether strips end at right angles on the boundary.
-    pub aligned_boundary: bool,
-    /// Triangles of the proxy that meshes of more than twice as many are woven on; 0: every mesh is woven on itself.
-    #[serde(skip_serializing_if = "is_usual_proxy")]
-    pub proxy: u32,
-    /// Radius over which the surface is smoothed for weaving, as a fraction of the bounding-box diagonal: strips pass over
-    /// smaller relief. 0: not at all. A smoothed mesh is a proxy, of whatever size.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub smoothing: f64,
-}
+/// A mesh has a proxy if it has more than this many times the proxy's triangles. With fewer, the time gained is small beside
+/// the detail lost.
+const LEAST_SIMPLIFICATION: usize = 2;
 
-/// Triangles of a proxy. See `docs/decisions.md` for the figures.
-const PROXY: u32 = 30_000;
-/// A mesh has a proxy from this many times its size on: below, it gains less than it loses in detail.
-const WORTH_IT: usize = 2;
-
-fn is_usual_proxy(n: &u32) -> bool {
-    *n == PROXY
-}
-
-fn is_zero(x: &f64) -> bool {
-    *x == 0.0
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            curvature_radius: 0.03,
-            sharp_dihedral: SHARP_DIHEDRAL,
-            aligned_boundary: true,
-            proxy: PROXY,
-            smoothing: 0.0,
-        }
-    }
-}
-
-/// A mesh made ready.
+/// A mesh prepared for weaving.
 #[derive(Debug)]
 pub struct Model {
     /// The mesh as read, its name, units and repairs.
     pub loaded: LoadedMesh,
-    /// The mesh that is woven on, shared with the graph: the one read, or its proxy.
+    /// The woven mesh, shared with the graph.
     pub mesh: Arc<TriMesh>,
-    /// Where another mesh is woven on than the one read: the maps between both.
+    /// The proxy with the maps between it and the design mesh, if the woven mesh is a proxy.
     pub proxy: Option<Proxy>,
-    /// The options it was made ready with.
+    /// The options it was prepared with.
     pub options: Options,
-    /// Components, genus, boundary of the mesh as read.
+    /// Components, genus and boundary of the design mesh.
     pub topology: Topology,
-    /// Whether each edge of the mesh that is woven on is sharp.
+    /// Whether each edge of the woven mesh is a sharp feature.
     pub sharp: Vec<bool>,
-    /// Principal curvatures at its vertices.
+    /// Principal curvatures at the vertices of the woven mesh.
     pub curvature: Vec<PrincipalCurvature>,
-    /// What each vertex adds to the curvature of its region.
+    /// Contribution of each vertex of the woven mesh to the total curvature of its region, in radians.
     pub vertex_curvatures: Vec<f64>,
-    /// The elastica graph.
+    /// The elastica graph on the woven mesh.
     pub graph: ElasticaGraph,
-    /// Points by ray or nearness of the mesh as read.
+    /// Ray and nearest-point queries on the design mesh.
     pub index: Arc<SurfaceIndex>,
-    /// Pronounced corners of the shape: singularities of its smooth curvature-guided cross field, with their
-    /// index in quarters.
+    /// Pronounced corners of the shape, on the woven mesh: singularities of its smooth curvature-aligned cross field, with
+    /// their index in quarters.
     pub corners: Vec<(VertexId, i8)>,
-    /// What the mesh as read has of its own where it has a proxy.
-    pub(in crate::weave) own: Own,
+    /// Data of the design mesh where the woven mesh is a proxy; empty otherwise.
+    pub(in crate::weave) design_data: DesignMeshData,
 }
 
-/// What only the embedding needs where a mesh has a proxy; empty otherwise.
+/// What the embedding needs of a design mesh that has a proxy.
 #[derive(Debug, Default)]
-pub(in crate::weave) struct Own {
-    /// Whether each edge of the mesh as read is sharp.
+pub(in crate::weave) struct DesignMeshData {
+    /// Whether each edge of the design mesh is a sharp feature.
     pub sharp: Vec<bool>,
-    /// Its curvature, once it was asked for.
+    /// Principal curvatures of the design mesh, computed on first use.
     pub curvature: OnceLock<Vec<PrincipalCurvature>>,
-    /// Points of the proxy by nearness, once they were asked for.
+    /// Nearest-point queries on the proxy, built on first use.
     pub proxy_index: OnceLock<SurfaceIndex>,
 }
 
 impl Model {
-    /// Prepares `loaded`.
+    /// Prepares a mesh for weaving.
     ///
     /// # Errors
     ///
-    /// [`WeaveError::Cancelled`], or what the graph or the field have to say.
+    /// [`WeaveError::Cancelled`], [`WeaveError::Elastica`] or [`WeaveError::Field`].
     pub fn prepare(loaded: LoadedMesh, options: Options, progress: &Progress) -> Result<Self, WeaveError> {
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&loaded.mesh);
@@ -120,9 +77,12 @@ impl Model {
         let index = Arc::new(SurfaceIndex::new(&loaded.mesh));
         progress.check()?;
         let proxy = proxy_of(&loaded.mesh, &sharp, &options, progress)?;
-        let (mesh, sharp, own) = match &proxy {
-            None => (loaded.mesh.clone(), sharp, Own::default()),
-            Some(proxy) => (Arc::new(proxy.mesh().clone()), proxy.sharp().to_vec(), Own { sharp, ..Own::default() }),
+        let (mesh, sharp, design_data) = match &proxy {
+            None => (loaded.mesh.clone(), sharp, DesignMeshData::default()),
+            Some(proxy) => {
+                let design_data = DesignMeshData { sharp, ..DesignMeshData::default() };
+                (Arc::new(proxy.mesh().clone()), proxy.sharp().to_vec(), design_data)
+            }
         };
         progress.report("Measuring curvature", 0.1);
         let curvature = principal_curvature(&mesh, options.curvature_radius, &sharp);
@@ -146,12 +106,12 @@ impl Model {
             graph,
             index,
             corners,
-            own,
+            design_data,
         })
     }
 }
 
-/// The proxy of a mesh that is to be woven on one. Where none can be made, the mesh is woven on itself.
+/// The proxy of a mesh that is large or to be smoothed. `None` for other meshes, and where no proxy can be built.
 fn proxy_of(
     mesh: &TriMesh,
     sharp: &[bool],
@@ -159,7 +119,7 @@ fn proxy_of(
     progress: &Progress,
 ) -> Result<Option<Proxy>, Cancelled> {
     let (target, n) = (options.proxy as usize, mesh.n_faces());
-    let large = target > 0 && n > WORTH_IT * target;
+    let large = target > 0 && n > LEAST_SIMPLIFICATION * target;
     if !large && options.smoothing <= 0.0 {
         return Ok(None);
     }
@@ -173,30 +133,32 @@ fn proxy_of(
         }
         Err(ProxyError::Cancelled(cancelled)) => Err(cancelled),
         Err(error) => {
-            tracing::warn!(%error, "no proxy");
+            tracing::warn!(%error, "no proxy: strips are woven on the design mesh");
             Ok(None)
         }
     }
 }
 
-/// Whether each edge of `mesh` is a feature.
+/// Whether each edge of `mesh` is a sharp feature: sharp, in a connected group of sharp edges that is not short.
 pub(in crate::weave) fn features(mesh: &TriMesh, options: &Options) -> Vec<bool> {
     let mut sharp = sharp_edges(mesh, options.sharp_dihedral);
     drop_short_features(mesh, &mut sharp, SHORT_FEATURE);
     sharp
 }
 
-/// Corners closer together than this fraction of the diagonal, and of opposite index, are noise of the field.
+/// Singularities of opposite index closer together than this, as a fraction of the diagonal, cancel as noise of the field.
 const CORNER_RADIUS: f64 = 0.08;
-/// Distance over which a full principal direction prevails over smoothness of the field.
-const GUIDE_RADIUS: f64 = 0.15;
-/// Relative difference of the principal curvatures that counts as a full guide.
+/// Distance over which a fully weighted principal direction outweighs smoothness of the field, as a fraction of the
+/// diagonal.
+const ALIGNMENT_RADIUS: f64 = 0.15;
+/// Difference of the absolute principal curvatures from which on a principal direction has full weight, in inverse
+/// diagonals.
 const FULL_ANISOTROPY: f64 = 10.0;
 
-/// The pronounced singularities of the shape's cross field.
+/// The pronounced singularities of the curvature-aligned cross field.
 ///
-/// A field that cannot be computed (on a degenerate mesh) leaves a shape without pronounced corners: they
-/// advise, but nothing depends on them.
+/// If the field cannot be computed (on a degenerate mesh), the shape has no pronounced corners. They only advise the
+/// designer; no layout needs them.
 fn shape_corners(
     mesh: &TriMesh,
     curvature: &[PrincipalCurvature],
@@ -215,14 +177,15 @@ fn shape_corners(
         directions.push(strongest.0);
         weights.push((strongest.1 / FULL_ANISOTROPY).min(1.0));
     }
-    let guides = AlignmentDirections { directions: &directions, weights: &weights, radius: GUIDE_RADIUS };
-    match feature_aligned_field(mesh, &metric, Some(guides), sharp, progress) {
-        Ok(field) => {
-            Ok(pronounced(mesh, &field.singularities, CORNER_RADIUS).into_iter().map(|s| (s.vertex, s.index)).collect())
-        }
+    let alignment = AlignmentDirections { directions: &directions, weights: &weights, radius: ALIGNMENT_RADIUS };
+    match feature_aligned_field(mesh, &metric, Some(alignment), sharp, progress) {
+        Ok(field) => Ok(cancel_opposite_pairs(mesh, &field.singularities, CORNER_RADIUS)
+            .into_iter()
+            .map(|s| (s.vertex, s.index))
+            .collect()),
         Err(error) => {
             progress.check()?;
-            tracing::warn!(%error, "no shape field: corners of the shape are not assessed");
+            tracing::warn!(%error, "no curvature-aligned field: corners of the shape are not assessed");
             Ok(Vec::new())
         }
     }

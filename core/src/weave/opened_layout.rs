@@ -1,4 +1,4 @@
-//! A layout from a file, made ready to be embedded.
+//! A layout from a layout file, prepared for its embedding.
 
 use std::path::Path;
 
@@ -9,12 +9,16 @@ use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
 use crate::weave::embedding::{InitialLayout, PinnedParts};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::{EmbeddingInput, Export, ExportOptions, Watch, finish, make_folder};
-use crate::weave::export::report::{Subject, Times, write_report};
+use crate::weave::export::files::make_folder;
+use crate::weave::export::input::{EmbeddingInput, ExportOptions, Watch};
+use crate::weave::export::refine::embed_and_refine;
+use crate::weave::export::report::{Subject, write_report};
+use crate::weave::export::result::{Export, Times};
 use crate::weave::mesh_role::MeshRole;
-use crate::weave::model::{Options, features};
+use crate::weave::model::features;
+use crate::weave::options::Options;
 
-/// A layout from a file with its mesh. The layout may lack arcs.
+/// A layout from a file, with its mesh and initial embedding. The layout may lack arcs.
 #[derive(Debug)]
 pub struct OpenedLayout {
     file: LayoutFile,
@@ -23,17 +27,17 @@ pub struct OpenedLayout {
     index: SurfaceIndex,
     curvature: Vec<PrincipalCurvature>,
     sharp: Vec<bool>,
-    drawn: InitialLayout,
+    initial: InitialLayout,
     arc_headings: Vec<ArcHeadings>,
     pinned: PinnedParts,
 }
 
 impl OpenedLayout {
-    /// Reads a layout and its mesh, and draws the one on the other.
+    /// Reads a layout file and its mesh, and embeds the layout on the mesh as the file says.
     ///
     /// # Errors
     ///
-    /// What the file, the mesh or the layout have to say.
+    /// When the file or the mesh cannot be read, or the layout does not fit the mesh.
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, WeaveError> {
         progress.report("Reading the layout", 0.0);
         let mut file = LayoutFile::read(path)?;
@@ -51,7 +55,7 @@ impl OpenedLayout {
             nodes: file.nodes.iter().map(|n| n.fixed).collect(),
             arcs: file.arcs.iter().map(|a| a.fixed).collect(),
         };
-        // Boundary arcs that the file leaves out come after those it names.
+        // Boundary arcs that are not in the file come after those that are; they are not pinned.
         pinned.arcs.resize(layout.arcs.len(), false);
         let options = Options::default();
         let sharp = features(&loaded.mesh, &options);
@@ -60,8 +64,8 @@ impl OpenedLayout {
         let curvature = principal_curvature(&loaded.mesh, options.curvature_radius, &sharp);
         progress.check()?;
         let (topology, arc_headings) = (Topology::new(&loaded.mesh), initial_embedding.arc_headings());
-        let drawn = InitialLayout { layout, embedding, mesh_role: MeshRole::Design };
-        Ok(Self { file, loaded, topology, index, curvature, sharp, drawn, arc_headings, pinned })
+        let initial = InitialLayout { layout, embedding, mesh_role: MeshRole::Design };
+        Ok(Self { file, loaded, topology, index, curvature, sharp, initial, arc_headings, pinned })
     }
 
     /// The mesh.
@@ -69,7 +73,7 @@ impl OpenedLayout {
         &self.loaded
     }
 
-    /// Pins nodes and arcs besides those that the file says are fixed.
+    /// Pins further nodes and arcs; those that are fixed in the file are pinned already.
     ///
     /// # Errors
     ///
@@ -81,12 +85,12 @@ impl OpenedLayout {
         Ok(())
     }
 
-    /// Embeds the layout and writes `layout.layout`, the layout as it was given but for chords collapsed, the meshes and `report.json`; the
-    /// inner result is the layout, or why there is none.
+    /// Embeds the layout and writes `layout.layout` (the layout as it was given, without collapsed chords), the meshes and
+    /// `report.json`. The inner result is the layout, or why there is none.
     ///
     /// # Errors
     ///
-    /// The file that could not be written, or cancelled.
+    /// [`WeaveError::Write`] or another error of writing, or when cancelled.
     pub fn write_all(
         &self,
         options: &ExportOptions,
@@ -97,21 +101,21 @@ impl OpenedLayout {
     ) -> Result<Result<Export, WeaveError>, WeaveError> {
         make_folder(folder)?;
         let mesh = &*self.loaded.mesh;
-        let sketch = EmbeddingInput {
+        let input = EmbeddingInput {
             surface: Surface { mesh, index: &self.index, curvature: &self.curvature, sharp: &self.sharp },
             proxy: None,
             units: self.loaded.units,
-            drawn: &self.drawn,
+            initial: &self.initial,
             arc_headings: &self.arc_headings,
             pinned: &self.pinned,
         };
-        let result = finish(&sketch, None, options, progress, watch);
+        let result = embed_and_refine(&input, None, options, progress, watch);
         progress.check()?;
         let mut file = self.file.clone();
         if let Ok(export) = &result {
             export.write(folder, &self.loaded.units)?;
             if export.has_collapsed() {
-                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.before.initial_embedding)?;
+                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.initial.initial_embedding)?;
             }
         }
         file.write(&folder.join("layout.layout"))?;

@@ -1,79 +1,70 @@
-//! What is proposed to the designer: loops found on the graph, relaxed to smooth curves.
+//! Proposals: loops of the elastica graph, relaxed to smooth curves.
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use crate::elastica::{ElasticaGraph, FoundLoop};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
+use crate::weave::design::ElasticEnergy;
 use crate::weave::error::WeaveError;
 use crate::weave::loop_contacts::LoopContacts;
 
 /// A strip that could be placed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// Its spine, on the mesh that is woven on.
+    /// Its spine on the woven mesh.
     pub curve: SurfaceCurve,
-    /// Cost of the loop that was found.
+    /// Elastica cost of the loop as it was found.
     pub cost: f64,
-    /// Its elastic energy, if it was found as a loop of the graph.
+    /// Its elastic energy, if it is a loop of the elastica graph.
     pub energy: Option<ElasticEnergy>,
 }
 
-/// Elastic energy of a loop, its length and weighted squared curvature, before and after it was relaxed. Alignment does
-/// not belong to it: relaxing keeps to the tube that the search chose with regard to it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ElasticEnergy {
-    /// As it was found and priced, in steps of the graph.
-    pub found: f64,
-    /// As it is now, a curve on the surface; the same as long as it was not relaxed.
-    pub now: f64,
-}
-
 impl Proposal {
-    /// A loop as it was found.
+    /// The proposal of a loop as it was found.
     pub(in crate::weave) fn found(l: &FoundLoop) -> Self {
         let energy = l.length + l.bending;
-        let energy = ElasticEnergy { found: energy, now: energy };
+        let energy = ElasticEnergy { found: energy, relaxed: energy };
         Self { curve: l.curve.clone(), cost: l.cost, energy: Some(energy) }
     }
 
-    /// The same with its curve relaxed.
+    /// The same proposal with a relaxed curve.
     pub(in crate::weave) fn relaxed(self, relaxed: Relaxed) -> Self {
-        let energy = self.energy.map(|e| ElasticEnergy { now: relaxed.after.total, ..e });
+        let energy = self.energy.map(|e| ElasticEnergy { relaxed: relaxed.after.total, ..e });
         Self { curve: relaxed.curve, energy, ..self }
     }
 
-    /// The spine as points in space; `mesh` is the one that is woven on.
+    /// The points of the spine; `mesh` is the woven mesh.
     pub fn points(&self, mesh: &TriMesh) -> Vec<DVec3> {
         self.curve.points(mesh)
     }
 }
 
-/// Radii of the tubes in which loops are relaxed, in mean edges: the next one where the loop would meet more than it did.
+/// Radii of the tubes in which a loop is relaxed, in mean edge lengths, tried in turn until the relaxed loop crosses no
+/// feature or strip more often than before.
 const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
-/// A found loop, relaxed to a smooth curve that still passes `at` and crosses neither features nor placed strips more
-/// often than it did.
+/// A found loop relaxed to a smooth curve through `at` that crosses no feature and no placed strip more often than the loop
+/// does. Where that fails in every tube, the loop as it was found.
 pub(in crate::weave) fn smoothed_proposal(
     graph: &ElasticaGraph,
-    company: &LoopContacts<'_>,
+    contacts: &LoopContacts<'_>,
     found: &FoundLoop,
     at: SurfacePoint,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
-    let before = company.met(&found.curve);
+    let before = contacts.count(&found.curve);
     for tube in TUBES {
         let options = RelaxOptions { waypoints: vec![at], tube, ..Default::default() };
         match relax(graph.mesh(), &found.curve, &options, progress) {
-            Ok(relaxed) if company.met(&relaxed.curve).no_more_than(&before) => {
+            Ok(relaxed) if contacts.count(&relaxed.curve).at_most(&before) => {
                 return Ok(Proposal::found(found).relaxed(relaxed));
             }
-            Ok(_) => tracing::debug!(tube, "a loop relaxed would cross more than it did"),
+            Ok(_) => tracing::debug!(tube, "the relaxed loop has more crossings"),
             Err(error) => {
                 progress.check()?;
-                tracing::debug!(%error, "a loop cannot be relaxed");
+                tracing::debug!(%error, "the loop cannot be relaxed");
                 break;
             }
         }

@@ -1,7 +1,7 @@
-//! The searches of the last places the pointer was at.
+//! A cache of the proposals at the last vertices that were pointed at.
 //!
-//! A pointer that moves stays near a vertex for some steps and comes back to it; what was found there holds as long
-//! as the strips are the same. A search that is cut short leaves what it had proved.
+//! A moving pointer stays near a vertex for some steps and returns to it. Proposals at a vertex are valid as long as the
+//! strips are the same. A cancelled search keeps the best loop that it had proved.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,32 +11,32 @@ use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 use crate::weave::woven::Woven;
 
-/// Number of vertices remembered: those under a small movement of the pointer.
-const REMEMBERED: usize = 16;
+/// Capacity of the cache, in vertices: those under a small movement of the pointer. Chosen by hand.
+const CAPACITY: usize = 16;
 
-/// What was found of late, and the memory of the searches.
+/// The cache and the workspaces of the searches.
 #[derive(Debug, Default)]
 pub(in crate::weave) struct RecentSearches {
     pub(in crate::weave) workspace: SearchWorkspace,
-    /// For searches along strips; their own, because what they have to prepare differs.
-    beside: SearchWorkspace,
-    /// The strips among which all this was found.
+    /// Of searches that keep clear of spines only. Separate, because their preparation depends on the mask.
+    spine_workspace: SearchWorkspace,
+    /// The strips that the cache is valid for.
     woven: Option<Arc<Woven>>,
-    /// The latest last.
+    /// The most recent last.
     found: VecDeque<Found>,
 }
 
-/// What was found at a vertex.
+/// Loops found at a vertex.
 #[derive(Debug)]
 struct Found {
     vertex: VertexId,
     best: Option<FoundLoop>,
-    /// All that is proposed, if that search has ended.
+    /// All loops, if the search has ended.
     all: Option<Arc<Vec<FoundLoop>>>,
 }
 
 impl RecentSearches {
-    /// The loops proposed at a vertex; what is there before all are found goes to `watch`.
+    /// The loops proposed at a vertex. The first loop and the best one are handed to `watch` as soon as they are found.
     pub(in crate::weave) fn proposals(
         &mut self,
         graph: &ElasticaGraph,
@@ -64,7 +64,7 @@ impl RecentSearches {
                 searched
             }
         };
-        if self.found.len() == REMEMBERED {
+        if self.found.len() == CAPACITY {
             self.found.pop_front();
         }
         self.found.push_back(found);
@@ -83,7 +83,7 @@ impl RecentSearches {
         if let Some(best) = best {
             watch(Certainty::Found, best);
         }
-        // What was found where the pointer was before.
+        // The best loop at the previous vertex starts the search.
         let nearby = self.found.iter().rev().find_map(|f| f.best.as_ref());
         let mut searched = |mask: &DirectionMask, work: &mut SearchWorkspace| {
             let classes = Some(&woven.classes);
@@ -97,8 +97,8 @@ impl RecentSearches {
             Ok(found.loops)
         };
         let loops = searched(&woven.mask, &mut self.workspace)?;
-        // Where strips cover every way through, only their spines are kept clear of.
-        if loops.is_empty() { searched(&woven.spine_mask, &mut self.beside) } else { Ok(loops) }
+        // Where strips cover every direction, loops keep clear of their spines only.
+        if loops.is_empty() { searched(&woven.spine_mask, &mut self.spine_workspace) } else { Ok(loops) }
     }
 }
 
@@ -110,7 +110,7 @@ mod tests {
     use crate::weave::{MeshSource, Options, Session};
 
     #[test]
-    fn what_was_found_is_remembered_until_the_strips_change() {
+    fn proposals_are_cached_until_the_strips_change() {
         let progress = Progress::new();
         let source = MeshSource::Builtin("torus".into());
         let mut session = Session::open(builtin("torus").unwrap(), source, Options::default(), &progress).unwrap();

@@ -1,8 +1,8 @@
-//! Weave scripts: a designer's steps in a file, replayed without a window.
+//! Weave scripts: steps of a designer in a file, replayed without a window.
 //!
 //! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`.
-//! Points are in the file's coordinates and snap to the nearest point of the surface. In place of a mesh there may be a
-//! saved design, with which the designer goes on.
+//! Points are in coordinates of the mesh file and snap to the nearest point of the surface. In place of a mesh there may be a
+//! saved design, which the script continues.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::weave::design::{Design, DesignError};
 use crate::weave::error::NoSuggestion;
 use crate::weave::error::WeaveError;
-use crate::weave::model::Options;
+use crate::weave::options::Options;
 use crate::weave::proposal::Proposal;
 use crate::weave::search::suggest::Goal;
 use crate::weave::session::Session;
@@ -25,21 +25,21 @@ use crate::weave::session::Session;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Step {
-    /// Point at the surface: the proposals through the nearest point of the surface, the best first.
+    /// Point at the surface: proposals through the nearest point of the surface, the cheapest first.
     Hover([f64; 3]),
-    /// Turn the wheel: so many proposals onward, or back if negative.
+    /// Turn the wheel: by so many proposals forward, or back if negative, cyclically.
     Browse(i64),
     /// Click: place the current proposal. `false` does nothing.
     Place(bool),
-    /// Press "Suggest" and place what is suggested; does nothing when nothing is left to do. `false` does nothing.
+    /// Press "Suggest" and place the suggestion; does nothing when the goal is reached. `false` does nothing.
     Suggest(bool),
-    /// Press "Improve": other strips are tried, in so many rounds at most.
+    /// Press "Improve", with so many rounds at most.
     Improve(usize),
-    /// Remove the strip placed as the `n`-th of those present, from 0.
+    /// Remove the `n`-th of the present strips in the order placed, from 0.
     Delete(usize),
-    /// Take the last change back. `false` does nothing.
+    /// Undo the last change. `false` does nothing.
     Undo(bool),
-    /// Make it again. `false` does nothing.
+    /// Redo the change undone last. `false` does nothing.
     Redo(bool),
 }
 
@@ -49,7 +49,7 @@ pub enum Step {
 pub struct Script {
     /// Name of a built-in model, or path of a mesh or of a design relative to the script.
     pub mesh: String,
-    /// The options; the usual ones if left out. A design brings its own.
+    /// The options; the default ones if left out. A design has its own.
     #[serde(default)]
     pub options: Options,
     /// The steps in order.
@@ -67,7 +67,7 @@ pub enum ScriptError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// The file is no script.
+    /// The file is not a script.
     #[error("{path} is not a weave script: {source}")]
     Format {
         /// The file.
@@ -89,9 +89,9 @@ pub enum ScriptError {
         /// Why.
         source: Box<WeaveError>,
     },
-    /// A step that makes no sense where it stands.
+    /// A step that cannot be taken at its place in the script.
     #[error("step {step}: {reason}")]
-    Senseless {
+    NotApplicable {
         /// Number of the step, from 1.
         step: usize,
         /// Why.
@@ -104,7 +104,7 @@ impl Script {
     ///
     /// # Errors
     ///
-    /// When there is no such file or it is no script.
+    /// When the file cannot be read or is not a script.
     pub fn read(path: &Path) -> Result<Self, ScriptError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| ScriptError::File { path: path.to_owned(), source })?;
@@ -112,24 +112,24 @@ impl Script {
     }
 }
 
-/// Replays `script`; its mesh is looked for relative to `folder`.
+/// Replays a script; the path of its mesh is relative to `folder`.
 ///
 /// # Errors
 ///
-/// The first step that fails or makes no sense.
+/// The first step that fails or cannot be taken.
 pub fn replay(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, ScriptError> {
     let mut session = open(script, folder, progress)?;
     let mut shown = Shown::default();
     for (i, step) in script.steps.iter().enumerate() {
-        shown.take(step, &mut session, progress).map_err(|e| match e {
+        shown.apply(step, &mut session, progress).map_err(|e| match e {
             StepError::Weave(source) => ScriptError::Step { step: i + 1, source },
-            StepError::Senseless(reason) => ScriptError::Senseless { step: i + 1, reason },
+            StepError::NotApplicable(reason) => ScriptError::NotApplicable { step: i + 1, reason },
         })?;
     }
     Ok(session)
 }
 
-/// The session that a script begins with.
+/// The session that a script starts with.
 fn open(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, ScriptError> {
     let opening = |source| ScriptError::Step { step: 0, source: Box::new(source) };
     let path = folder.join(&script.mesh);
@@ -150,7 +150,7 @@ fn open(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, 
     Session::open(loaded, source, script.options, progress).map_err(opening)
 }
 
-/// The proposals on show and the one picked.
+/// The proposals that are shown and the number of the current one.
 #[derive(Default)]
 struct Shown {
     proposals: Vec<Proposal>,
@@ -159,7 +159,7 @@ struct Shown {
 
 enum StepError {
     Weave(Box<WeaveError>),
-    Senseless(&'static str),
+    NotApplicable(&'static str),
 }
 
 impl From<WeaveError> for StepError {
@@ -169,30 +169,30 @@ impl From<WeaveError> for StepError {
 }
 
 impl Shown {
-    fn take(&mut self, step: &Step, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
+    fn apply(&mut self, step: &Step, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
         match *step {
             Step::Hover(at) => {
                 let at = session.model().loaded.units.from_file(DVec3::from(at));
                 if !at.is_finite() {
-                    return Err(StepError::Senseless("the point is not finite"));
+                    return Err(StepError::NotApplicable("the point is not finite"));
                 }
                 let at = session.model().index.nearest(at);
                 self.proposals = session.proposals(at, progress)?;
                 self.current = 0;
                 if self.proposals.is_empty() {
-                    return Err(StepError::Senseless("no strip passes this point"));
+                    return Err(StepError::NotApplicable("no strip passes this point"));
                 }
             }
             Step::Browse(by) => {
                 let n = self.proposals.len() as i64;
                 if n == 0 {
-                    return Err(StepError::Senseless("nothing to browse: hover first"));
+                    return Err(StepError::NotApplicable("nothing to browse: hover first"));
                 }
                 self.current = (self.current as i64 + by).rem_euclid(n) as usize;
             }
             Step::Place(true) => {
                 let proposal = self.proposals.get(self.current).cloned();
-                let proposal = proposal.ok_or(StepError::Senseless("nothing to place: hover first"))?;
+                let proposal = proposal.ok_or(StepError::NotApplicable("nothing to place: hover first"))?;
                 session.place(proposal, progress)?;
                 *self = Self::default();
             }
@@ -212,7 +212,7 @@ impl Shown {
             }
             Step::Delete(n) => {
                 let id = session.design().strips.get(n).map(|s| s.id);
-                session.remove(id.ok_or(StepError::Senseless("there is no such strip"))?, progress)?;
+                session.remove(id.ok_or(StepError::NotApplicable("there is no such strip"))?, progress)?;
             }
             Step::Undo(true) => session.undo(progress)?,
             Step::Redo(true) => session.redo(progress)?,

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::dual::{Arrangement, ArrangementError};
 use crate::elastica::{Certainty, FoundLoop};
 use crate::mesh::{LoadedMesh, MeshSource, fingerprint};
@@ -10,16 +12,16 @@ use crate::surface::{SurfaceCurve, SurfacePoint};
 use crate::weave::design::{Design, Pin, Strip, StripId};
 use crate::weave::error::WeaveError;
 use crate::weave::loop_contacts::LoopContacts;
-use crate::weave::mesh_role::alike;
-use crate::weave::model::{Model, Options};
+use crate::weave::mesh_role::same_regions;
+use crate::weave::model::Model;
+use crate::weave::options::Options;
 use crate::weave::proposal::{Proposal, smoothed_proposal};
 use crate::weave::recent::RecentSearches;
 use crate::weave::woven::Woven;
-use rayon::prelude::*;
 
 /// A state of the history: strips, and the pins that were set while they were there.
 #[derive(Debug, Clone)]
-pub(in crate::weave) struct Step {
+pub(in crate::weave) struct HistoryState {
     strips: Vec<Strip>,
     pins: Vec<Pin>,
 }
@@ -30,15 +32,15 @@ pub struct Session {
     model: Arc<Model>,
     design: Design,
     woven: Arc<Woven>,
-    /// Earlier and later states.
-    undo: Vec<Step>,
-    redo: Vec<Step>,
+    /// Earlier states, the last one on top, and states that were undone.
+    undo: Vec<HistoryState>,
+    redo: Vec<HistoryState>,
     next_id: u32,
     recent: RecentSearches,
 }
 
 impl Session {
-    /// Makes `loaded` ready and starts an empty design on it.
+    /// Prepares a mesh and starts an empty design on it.
     ///
     /// # Errors
     ///
@@ -53,19 +55,19 @@ impl Session {
         Self::resume(loaded, design, progress)
     }
 
-    /// Makes `loaded` ready and continues `design` on it.
+    /// Prepares a mesh and continues a design on it.
     ///
     /// # Errors
     ///
-    /// See [`Model::prepare`]; [`DesignError::OtherMesh`] when the design was made on another mesh.
+    /// See [`Model::prepare`]; [`WeaveError::Design`] when the design was made on another mesh.
     pub fn resume(loaded: LoadedMesh, mut design: Design, progress: &Progress) -> Result<Self, WeaveError> {
         design.check_mesh(&loaded.mesh)?;
         let mut model = Model::prepare(loaded, design.options, progress)?;
-        if !on_proxy(&model, &mut design)? {
-            tracing::warn!("the strips do not fit the proxy: woven without one");
+        if !transfer_to_proxy(&model, &mut design)? {
+            tracing::warn!("the strips have another layout on the proxy: woven on the design mesh");
             let options = Options { proxy: 0, smoothing: 0.0, ..design.options };
             model = Model::prepare(model.loaded, options, progress)?;
-            on_proxy(&model, &mut design)?;
+            transfer_to_proxy(&model, &mut design)?;
         }
         let model = Arc::new(model);
         let woven = Arc::new(Woven::new(&model, &design.strips, progress)?);
@@ -74,25 +76,25 @@ impl Session {
         Ok(Self { model, design, woven, undo, redo, next_id, recent })
     }
 
-    /// The same design woven under other options. Strips stay where they are; of the history there is as much as fits.
+    /// The same design under other options. Strips keep their curves on the design mesh. The history is cut where its strips
+    /// have another arrangement on the new woven mesh.
     ///
     /// # Errors
     ///
-    /// See [`Model::prepare`]; [`WeaveError::Options`] if the strips make something else of the mesh that would be woven
-    /// on.
+    /// See [`Model::prepare`]; [`WeaveError::Options`] if the strips have another arrangement on the new woven mesh.
     pub fn with_options(&self, options: Options, progress: &Progress) -> Result<Self, WeaveError> {
         let design = Design { options, ..self.design.clone() };
         let mut new = Self::resume(self.model.loaded.clone(), design, progress)?;
         if new.model.options != options {
             return Err(WeaveError::Options);
         }
-        let fits = |step: &Step| {
+        let fits = |step: &HistoryState| {
             let mut design = Design { strips: step.strips.clone(), ..new.design.clone() };
-            let fits = on_proxy(&new.model, &mut design).unwrap_or(false);
-            fits.then(|| Step { strips: design.strips, pins: step.pins.clone() })
+            let fits = transfer_to_proxy(&new.model, &mut design).unwrap_or(false);
+            fits.then(|| HistoryState { strips: design.strips, pins: step.pins.clone() })
         };
-        let history = |steps: &[Step]| {
-            let mut kept: Vec<Step> = steps.iter().rev().map_while(fits).collect();
+        let history = |steps: &[HistoryState]| {
+            let mut kept: Vec<HistoryState> = steps.iter().rev().map_while(fits).collect();
             kept.reverse();
             kept
         };
@@ -101,7 +103,7 @@ impl Session {
         Ok(new)
     }
 
-    /// The mesh made ready.
+    /// The prepared mesh.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
@@ -111,17 +113,17 @@ impl Session {
         &self.design
     }
 
-    /// Says where the mesh of the design is to be found from now on.
+    /// Sets where the mesh of the design is found.
     pub fn set_source(&mut self, source: MeshSource) {
         self.design.mesh = source;
     }
 
-    /// What the strips make of the surface.
+    /// The arrangement of the strips and what follows from it.
     pub fn woven(&self) -> &Arc<Woven> {
         &self.woven
     }
 
-    /// The strips that could be placed through a point of the design's mesh, the best first.
+    /// Strips that can be placed through a point of the design mesh, the cheapest first.
     ///
     /// # Errors
     ///
@@ -130,8 +132,8 @@ impl Session {
         self.proposals_with(at, progress, |_| {})
     }
 
-    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best, and the best
-    /// when it is, before alternatives are there.
+    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best, and the best one,
+    /// smoothed, before its alternatives are found.
     ///
     /// # Errors
     ///
@@ -146,8 +148,8 @@ impl Session {
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
         let placed = self.design.strips.iter().map(Strip::woven);
-        let company = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
-        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &company, l, at, progress);
+        let contacts = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
+        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &contacts, l, at, progress);
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
             Certainty::Found => first(Proposal::found(l)),
@@ -160,7 +162,7 @@ impl Session {
             }
         };
         let found = self.recent.proposals(graph, &self.woven, vertex, progress, &mut watch)?;
-        // What was handed out already is not smoothed again.
+        // The best loop is smoothed already if the search has proved it.
         let (known, smooth) = best.map_or((None, None), |(curve, smooth)| (Some(curve), Some(smooth)));
         let done = found.first().is_some_and(|l| known.as_ref() == Some(&l.curve));
         let rest: Vec<_> = found.par_iter().skip(usize::from(done)).map(smoothed_proposal).collect();
@@ -171,7 +173,8 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// When its curve does not lie on the mesh, or cancelled; the design is then as before.
+    /// When its curve does not lie on the mesh or has no counterpart on the design mesh, or when cancelled; the session is
+    /// then unchanged.
     pub fn place(&mut self, proposal: Proposal, progress: &Progress) -> Result<StripId, WeaveError> {
         let id = self.free_id();
         let mut strips = self.design.strips.clone();
@@ -187,7 +190,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`WeaveError::NoStrip`], or cancelled; the design is then as before.
+    /// [`WeaveError::NoStrip`], or when cancelled; the session is then unchanged.
     pub fn remove(&mut self, id: StripId, progress: &Progress) -> Result<(), WeaveError> {
         let strips: Vec<Strip> = self.design.strips.iter().filter(|s| s.id != id).cloned().collect();
         if strips.len() == self.design.strips.len() {
@@ -207,101 +210,102 @@ impl Session {
         Ok(())
     }
 
-    /// Whether there is a step to take back.
+    /// Whether there is a change to undo.
     pub fn can_undo(&self) -> bool {
         !self.undo.is_empty()
     }
 
-    /// Whether there is a step to take again.
+    /// Whether there is a change to redo.
     pub fn can_redo(&self) -> bool {
         !self.redo.is_empty()
     }
 
-    /// Takes the last step back; does nothing when there is none.
+    /// Undoes the last change; does nothing when there is none.
     ///
     /// # Errors
     ///
     /// When cancelled.
     pub fn undo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
         let Some(step) = self.undo.last().cloned() else { return Ok(()) };
-        let now = self.turn_to(step, progress)?;
+        let now = self.replace_state(step, progress)?;
         self.undo.pop();
         self.redo.push(now);
         Ok(())
     }
 
-    /// Takes a step again; does nothing when there is none.
+    /// Redoes the change undone last; does nothing when there is none.
     ///
     /// # Errors
     ///
     /// When cancelled.
     pub fn redo(&mut self, progress: &Progress) -> Result<(), WeaveError> {
         let Some(step) = self.redo.last().cloned() else { return Ok(()) };
-        let now = self.turn_to(step, progress)?;
+        let now = self.replace_state(step, progress)?;
         self.redo.pop();
         self.undo.push(now);
         Ok(())
     }
 
-    /// Says which parts of the present layout are to stay where they are; not a step of the history. Other strips make
-    /// another layout, which starts without pins.
+    /// Sets which parts of the present layout keep their positions; not a step of the history. Pins belong to one layout: a
+    /// change of the strips removes them.
     pub fn set_pins(&mut self, pins: Vec<Pin>) {
         self.design.pins = pins;
     }
 
     fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
-        let now = self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
+        let now = self.replace_state(HistoryState { strips, pins: Vec::new() }, progress)?;
         self.remember(now);
         Ok(())
     }
 
-    /// Makes a state that has been left the last one of the history.
-    pub(in crate::weave) fn remember(&mut self, before: Step) {
+    /// Pushes a former state to the history and drops the states that could be redone.
+    pub(in crate::weave) fn remember(&mut self, before: HistoryState) {
         self.undo.push(before);
         self.redo.clear();
     }
 
     /// The present state.
-    pub(in crate::weave) fn step(&self) -> Step {
-        Step { strips: self.design.strips.clone(), pins: self.design.pins.clone() }
+    pub(in crate::weave) fn state(&self) -> HistoryState {
+        HistoryState { strips: self.design.strips.clone(), pins: self.design.pins.clone() }
     }
 
-    /// Weaves other strips; what was before is for the caller to remember.
+    /// Replaces the strips without a step of the history; the caller remembers the former state.
     pub(in crate::weave) fn weave(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
         let newest = strips.iter().map(|s| s.id.0 + 1).max().unwrap_or(0);
-        self.turn_to(Step { strips, pins: Vec::new() }, progress)?;
+        self.replace_state(HistoryState { strips, pins: Vec::new() }, progress)?;
         self.next_id = self.next_id.max(newest);
         Ok(())
     }
 
-    /// Goes back to a state that was woven before.
-    pub(in crate::weave) fn restore(&mut self, step: Step, woven: Arc<Woven>) {
+    /// Returns to a former state with what was derived from it.
+    pub(in crate::weave) fn restore(&mut self, step: HistoryState, woven: Arc<Woven>) {
         (self.design.strips, self.design.pins, self.woven) = (step.strips, step.pins, woven);
     }
 
-    /// The number that the next strip gets.
+    /// The number of the next strip.
     pub(in crate::weave) fn free_id(&self) -> StripId {
         StripId(self.next_id)
     }
 
-    /// Weaves another state in place of the present one, which is returned.
-    fn turn_to(&mut self, step: Step, progress: &Progress) -> Result<Step, WeaveError> {
+    /// Replaces the present state, which is returned; on an error the session is unchanged.
+    fn replace_state(&mut self, step: HistoryState, progress: &Progress) -> Result<HistoryState, WeaveError> {
         self.woven = Arc::new(Woven::new(&self.model, &step.strips, progress)?);
         let strips = std::mem::replace(&mut self.design.strips, step.strips);
         let pins = std::mem::replace(&mut self.design.pins, step.pins);
-        Ok(Step { strips, pins })
+        Ok(HistoryState { strips, pins })
     }
 
-    /// What the surface would look like with `proposal` added; for suggestions.
+    /// The arrangement of the placed strips and one more curve on the woven mesh.
     pub(in crate::weave) fn arranged_with(&self, curve: &SurfaceCurve) -> Result<Arrangement, ArrangementError> {
         let placed = self.design.strips.iter().map(Strip::woven);
         Arrangement::unsubdivided(&self.model.mesh, placed.chain([curve]))
     }
 }
 
-/// Puts the strips of a design on the proxy of a model, if it has one: as they were woven, or else as they lie on the
-/// mesh. Tells whether they make the same of both meshes.
-fn on_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError> {
+/// Sets the curves of a design's strips on the proxy of a model, if it has one: those stored in the design if they were made
+/// on the same proxy, else the projections of the curves on the design mesh. Returns whether both meshes have the same
+/// arrangement.
+fn transfer_to_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError> {
     let Some(proxy) = &model.proxy else {
         design.proxy = None;
         design.strips.iter_mut().for_each(|s| s.on_proxy = None);
@@ -317,12 +321,12 @@ fn on_proxy(model: &Model, design: &mut Design) -> Result<bool, ArrangementError
         match proxy.curve_to_proxy(original, &strip.curve) {
             Ok(curve) => strip.on_proxy = Some(curve),
             Err(error) => {
-                tracing::debug!(%error, strip = strip.id.0, "not on the proxy");
+                tracing::debug!(%error, strip = strip.id.0, "the strip has no curve on the proxy");
                 return Ok(false);
             }
         }
     }
-    let here = Arrangement::unsubdivided(&model.mesh, design.strips.iter().map(Strip::woven))?;
-    let there = Arrangement::unsubdivided(original, design.strips.iter().map(|s| &s.curve))?;
-    Ok(alike(&here, &there))
+    let on_proxy = Arrangement::unsubdivided(&model.mesh, design.strips.iter().map(Strip::woven))?;
+    let on_design = Arrangement::unsubdivided(original, design.strips.iter().map(|s| &s.curve))?;
+    Ok(same_regions(&on_proxy, &on_design))
 }

@@ -1,4 +1,5 @@
-//! What the placed strips make of the surface: arrangement, assessment, strip map, directions still open.
+//! What follows from the placed strips: their arrangement, the assessment of its regions, the strip map, and the
+//! directions in which further strips may run.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +14,8 @@ use crate::weave::design::Strip;
 use crate::weave::error::WeaveError;
 use crate::weave::model::Model;
 
-/// Strips within this angle of a placed one's isolines are equivalent to it (Campen, section 8.2.2).
-const COMPATIBLE: f64 = std::f64::consts::FRAC_PI_4;
+/// Strips within this angle of the isolines of a placed one, in radians, are equivalent to it (Campen, section 8.2.2).
+const EQUIVALENT: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Everything derived from a model and its placed strips.
 #[derive(Debug)]
@@ -25,13 +26,13 @@ pub struct Woven {
     pub reports: Vec<RegionReport>,
     /// Directions in which no further strip may run.
     pub mask: DirectionMask,
-    /// Of these only the directions along the strips' spines.
+    /// The same for directions along the spines of strips only.
     pub spine_mask: DirectionMask,
-    /// Which loops are one another shifted, past no corner of the shape and no crossing of strips.
+    /// Homology classes of loops on the surface punctured at corners of the shape and crossings of strips.
     pub classes: HomologyClasses,
-    /// The refined mesh of the arrangement as a mesh of its own.
+    /// The refined mesh of the arrangement as a triangle mesh.
     pub mesh: TriMesh,
-    /// The map of all strips on that mesh; `None` without strips, or where it cannot be computed.
+    /// The strip map on that mesh; `None` without strips, or where it cannot be computed.
     pub strip_map: Option<StripMap>,
 }
 
@@ -40,7 +41,7 @@ impl Woven {
     ///
     /// # Errors
     ///
-    /// A strip that does not lie on the mesh, or [`WeaveError::Cancelled`].
+    /// [`WeaveError::Arrangement`] for a strip that does not lie on the mesh, or [`WeaveError::Cancelled`].
     pub fn new(model: &Model, strips: &[Strip], progress: &Progress) -> Result<Self, WeaveError> {
         progress.report("Arranging strips", 0.0);
         let arrangement = Arrangement::new(&model.mesh, strips.iter().map(Strip::woven))?;
@@ -52,21 +53,20 @@ impl Woven {
         progress.report("Closing directions", 0.95);
         let mut spine_mask = DirectionMask::none();
         for strip in strips {
-            close_along(model, strip, &mut spine_mask);
+            mask_spine(model, strip, &mut spine_mask);
         }
         let mut mask = spine_mask.clone();
         if let Some(map) = &strip_map {
-            close_inside(model, &arrangement, &mesh, map, &mut mask);
+            mask_isolines(model, &arrangement, &mesh, map, &mut mask);
         }
-        let classes = classes(model, &arrangement);
+        let classes = homology_classes(model, &arrangement);
         progress.report("Ready", 1.0);
         Ok(Self { arrangement, reports, mask, spine_mask, classes, mesh, strip_map })
     }
 
-    /// The regions that cannot be nodes yet.
+    /// The red regions: those that cannot be nodes of a layout.
     pub fn red(&self) -> Vec<u32> {
-        let red = |r: &(usize, &RegionReport)| r.1.colour == Colour::Red;
-        self.reports.iter().enumerate().filter(red).map(|(i, _)| i as u32).collect()
+        red_regions(&self.reports)
     }
 
     /// Number of regions of a colour.
@@ -75,9 +75,14 @@ impl Woven {
     }
 }
 
-/// A strip on the other side of a corner separates other corners; on the other side of a crossing it crosses the strips in
-/// another order.
-fn classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses {
+/// The red regions of an assessment.
+pub(in crate::weave) fn red_regions(reports: &[RegionReport]) -> Vec<u32> {
+    (0..).zip(reports).filter(|(_, r)| r.colour == Colour::Red).map(|(i, _)| i).collect()
+}
+
+/// Homology classes of the surface punctured at corners and crossings: a strip on the other side of a corner separates other
+/// corners, one on the other side of a crossing crosses strips in another order.
+fn homology_classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses {
     let mesh = &*model.mesh;
     let corners = model.corners.iter().map(|c| c.0);
     let crossings = arrangement.crossings.iter().map(|c| {
@@ -87,24 +92,24 @@ fn classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses {
     HomologyClasses::new(mesh, corners.chain(crossings))
 }
 
-/// Closes the directions along a strip's spine in the triangles it passes.
-fn close_along(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
+/// Masks the directions along a strip's spine in the triangles it passes.
+fn mask_spine(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
     let (mesh, curve) = (&model.mesh, strip.woven());
     let n = curve.crossings.len();
     for i in usize::from(!curve.closed)..n {
         let Some(face) = curve.face_before(mesh, i) else { continue };
         let direction = curve.point(mesh, i) - curve.point(mesh, (i + n - 1) % n);
-        model.graph.disable_near(mask, face, direction, COMPATIBLE);
+        model.graph.disable_near(mask, face, direction, EQUIVALENT);
     }
 }
 
-/// Closes the directions along the isolines of the strips that cover each triangle.
-fn close_inside(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: &StripMap, mask: &mut DirectionMask) {
+/// Masks the directions along the isolines of the strips that cover each triangle.
+fn mask_isolines(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: &StripMap, mask: &mut DirectionMask) {
     let mut largest: BTreeMap<(u32, u32), (f64, DVec3)> = BTreeMap::new();
     for f in mesh.faces() {
         for (axis, strip) in map.covered[f.index()].iter().enumerate() {
             let Some(strip) = strip else { continue };
-            // Of the pieces of one original triangle the largest speaks for all.
+            // The largest piece of a triangle of the woven mesh stands for all its pieces.
             let entry = largest.entry((arrangement.refined.base_face(f.0), *strip)).or_insert((-1.0, DVec3::ZERO));
             let area = mesh.face_area(f);
             if area > entry.0 {
@@ -114,12 +119,12 @@ fn close_inside(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: &
     }
     for ((face, _), (_, direction)) in largest {
         if direction != DVec3::ZERO {
-            model.graph.disable_near(mask, FaceId(face), direction, COMPATIBLE);
+            model.graph.disable_near(mask, FaceId(face), direction, EQUIVALENT);
         }
     }
 }
 
-/// The strip map of an arrangement; without one strips are lines that close the directions beside them only.
+/// The strip map of an arrangement. Without one only the spines of strips are masked.
 fn strip_map(arrangement: &Arrangement, mesh: &TriMesh, progress: &Progress) -> Result<Option<StripMap>, Cancelled> {
     let curve = |e| match arrangement.refined.mark(mesh.halfedge(e).0) {
         Mark::Curve(c) => Some(c),

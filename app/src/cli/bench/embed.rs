@@ -1,26 +1,26 @@
-//! Embedding: from the strips of a valid layout to its patches on the surface.
+//! Time to embed a valid layout, from its strips to the maps of its patches.
 
 use std::time::Instant;
 
 use plait_core::progress::Progress;
 use plait_core::weave::{ExportOptions, Goal, QuadSize, Session, export};
 
-use super::RunArguments;
+use super::super::arguments::bench::RunArguments;
 use super::report::{Report, Staged};
 
-/// The group of the rows.
+/// Group of the rows in the report.
 pub(super) const GROUP: &str = "embed";
-/// All stages together.
+/// Row of the total time.
 pub(super) const EMBEDDED: &str = "embedded";
 
-/// Weaves by suggestions until the layout is valid and embeds it several times.
+/// Places suggested strips until the layout is valid, then embeds it several times.
 pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
     let start = Instant::now();
     if let Some(stuck) = session.weave_to(Goal::Valid, &Progress::new())? {
         anyhow::bail!("there is no layout to embed: {stuck}");
     }
     report.add_times(GROUP, "woven by suggestions", &[start.elapsed()]);
-    // As few quads as there can be: refining is not what is measured.
+    // The coarsest quad mesh, since its computation is not measured.
     let options = ExportOptions { size: QuadSize::Count(1), ..Default::default() };
     let mut staged = Staged::default();
     for _ in 0..arguments.repeats {

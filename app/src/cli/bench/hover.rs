@@ -1,48 +1,46 @@
-//! Hovering: proposals at random points of the surface, with more and more strips placed, and along strokes of a
-//! moving pointer.
+//! Time to find proposals, at random points and along strokes of a moving pointer, with more and more strips placed.
 
 use std::time::{Duration, Instant};
 
 use plait_core::elastica::{ProposalQuery, SearchWorkspace};
 use plait_core::progress::Progress;
-use plait_core::surface::Metric;
-use plait_core::surface::SurfacePoint;
+use plait_core::surface::{Metric, SurfacePoint};
 use plait_core::weave::Session;
 
-use super::RunArguments;
+use super::super::arguments::bench::RunArguments;
 use super::points::Points;
 use super::report::{Report, Unit};
 use super::strips;
 
-/// A first loop is there.
+/// Row: time until the first loop is found.
 pub(super) const SHOWN: &str = "a loop shown";
-/// The search for the best alone has ended.
+/// Row: time until the search has proved which loop is best.
 pub(super) const PROVED: &str = "proved best";
-/// The search for all loops up to half as dear again has ended.
+/// Row: time of the search for all loops of at most 1.5 times the cost of the best.
 pub(super) const ALTERNATIVES: &str = "alternatives to 1.5 × best";
-/// What the window does next: the best loop, relaxed.
+/// Row: time until the window shows the best loop, relaxed.
 const BEST: &str = "the best loop, relaxed";
-/// What the window does: the first loop, then all alternatives, relaxed.
+/// Row: time until the window has all alternatives, relaxed.
 const ALL: &str = "all proposals, relaxed";
 
-/// Elastic energy of the best loop as the search found it.
+/// Row: elastic energy of the best loop before relaxation.
 const ENERGY: &str = "length and bending of the best loop";
-/// And of the curve that is proposed.
+/// Row: elastic energy of the proposed curve, after relaxation.
 const RELAXED: &str = "the same, relaxed";
-/// The second over the first.
+/// Row: ratio of the two energies.
 const RELAXED_SHARE: &str = "the same, relaxed / found";
 
-/// Points of one stroke of the pointer.
+/// Number of points of one stroke of the pointer.
 const STROKE: usize = 25;
-/// Distance between them, for a surface of bounding-box diagonal 1: some pixels of a window.
+/// Distance between them, as a fraction of the bounding-box diagonal: a few pixels in the window.
 const STEP: f64 = 0.004;
 
-/// The group of the rows with so many strips placed.
+/// Group of the rows in the report, for this number of placed strips.
 pub(super) fn group(strips: usize) -> String {
     format!("hover, {strips} strips")
 }
 
-/// Times proposals before and after strips are placed.
+/// Times proposals, for each number of strips in the arguments.
 pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
     let mut counts = arguments.strips.clone();
     counts.sort_unstable();
@@ -62,7 +60,7 @@ pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &
     Ok(())
 }
 
-/// The search alone, at random points. Never inlined: `scripts/instructions.sh` counts what it executes.
+/// Times the search alone, at random points. Never inlined: `scripts/instructions.sh` counts its instructions.
 #[inline(never)]
 fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
     let (model, mask) = (session.model(), &session.woven().mask);
@@ -111,7 +109,7 @@ struct Figures {
     shown: Vec<Duration>,
     proved: Vec<Duration>,
     alternatives: Vec<Duration>,
-    /// Cost of the loop shown over that of the best.
+    /// Cost of the first loop relative to the best.
     excess: Vec<f64>,
     loops: Vec<f64>,
     settled: Vec<f64>,
@@ -138,18 +136,18 @@ impl Figures {
     }
 }
 
-/// What the window does, at random points and along strokes.
+/// Times what the window does, at random points and along strokes.
 fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report: &mut Report) -> anyhow::Result<()> {
     let model = session.model().clone();
     let mesh = &model.loaded.mesh;
     let metric = Metric::new(mesh);
     let mut points = Points::new(mesh, arguments.seed);
-    let apart: Vec<SurfacePoint> = (0..arguments.points).map(|_| points.point()).collect();
+    let scattered: Vec<SurfacePoint> = (0..arguments.points).map(|_| points.point()).collect();
     let strokes = arguments.points.div_ceil(STROKE);
     let moving: Vec<SurfacePoint> =
         (0..strokes).flat_map(|_| points.stroke(mesh, &metric, STROKE, STEP)).take(arguments.points).collect();
     let (mut before, mut after) = (Vec::new(), Vec::new());
-    for (name, list) in [("pointer", apart), ("moving pointer", moving)] {
+    for (name, list) in [("pointer", scattered), ("moving pointer", moving)] {
         let (mut shown, mut proved, mut all) = (Vec::new(), Vec::new(), Vec::new());
         let progress = Progress::new();
         let start = Instant::now();
@@ -166,7 +164,7 @@ fn pointer(session: &mut Session, arguments: &RunArguments, group: &str, report:
             proved.extend(best);
             if let Some(energy) = proposals.first().and_then(|p| p.energy) {
                 before.push(energy.found);
-                after.push(energy.now);
+                after.push(energy.relaxed);
             }
             if start.elapsed() > arguments.limit() {
                 break;

@@ -1,4 +1,4 @@
-//! The mesh that is measured: a file, a built-in model, or one of these subdivided.
+//! The mesh of a benchmark: a file or a built-in model, possibly subdivided.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,8 @@ use plait_core::mesh::{
 };
 use plait_core::progress::Progress;
 
-/// What is opened. Only a file as it is has to be read from disk; all else is kept as the text of an OBJ file.
+/// The input of the measurements. Built-in and subdivided meshes are kept in memory as the text of an OBJ file, so that
+/// reading them is measured too.
 #[derive(Debug)]
 pub(super) enum Input {
     File(PathBuf),
@@ -16,7 +17,7 @@ pub(super) enum Input {
 }
 
 impl Input {
-    /// The file at `path`, or else the built-in model of this name, every triangle cut in four `levels` times.
+    /// The file at `path` or the built-in model of this name, after `levels` Loop subdivisions.
     pub(super) fn new(path: &Path, levels: u32) -> anyhow::Result<Self> {
         let source = MeshSource::from_name(&path.to_string_lossy());
         let is_file = matches!(source, MeshSource::File(_));
@@ -35,7 +36,7 @@ impl Input {
         Ok(Self::Memory { name: format!("{}.obj", loaded.name), obj })
     }
 
-    /// Opens it.
+    /// Reads the mesh.
     pub(super) fn load(&self, progress: &Progress) -> anyhow::Result<LoadedMesh> {
         let loaded = match self {
             Self::File(path) => {
@@ -49,7 +50,7 @@ impl Input {
         Ok(loaded?)
     }
 
-    /// What a design on it would call its mesh.
+    /// The mesh source of a design on this input.
     pub(super) fn source(&self) -> MeshSource {
         match self {
             Self::File(path) => MeshSource::File(path.clone()),

@@ -1,15 +1,15 @@
-//! The facts of the machine and of the program that figures depend on.
+//! The machine and the program that run times depend on.
 
 use serde::{Deserialize, Serialize};
 
-/// What figures were measured on.
+/// The machine of a measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Machine {
-    /// The processor's name, where the system tells it.
+    /// Name of the processor; `None` if the system does not tell.
     pub(super) processor: Option<String>,
-    /// Cores that the program may use.
+    /// Number of cores available to the program.
     pub(super) cores: usize,
-    /// Memory in bytes, where the system tells it.
+    /// Memory in bytes; `None` if the system does not tell.
     pub(super) memory: Option<u64>,
     /// Operating system and architecture.
     pub(super) system: String,
@@ -28,7 +28,7 @@ impl Machine {
     }
 }
 
-/// Version of the program, and how far its compiler went.
+/// Version of the program, and its optimisation level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Program {
     version: String,
@@ -48,7 +48,7 @@ impl std::fmt::Display for Program {
     }
 }
 
-/// The most memory this process has held so far, in bytes, where the system tells it.
+/// Peak memory of this process in bytes; `None` if the system does not tell.
 pub(super) fn peak_memory() -> Option<u64> {
     field("/proc/self/status", "VmHWM").and_then(|t| kilobytes(&t))
 }

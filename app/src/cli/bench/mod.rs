@@ -1,8 +1,8 @@
-//! `plait bench`: how long a designer waits, on any mesh, with figures that anyone can repeat.
+//! `plait bench`: run times of everything a designer waits for, on any mesh.
 //!
-//! Points are drawn uniformly by area with a fixed seed, so that two runs ask for the same. Stages are those that
-//! the work itself reports, so that the figures follow the program wherever it goes. Every report carries the facts
-//! of the machine and two yardsticks from the same run, by which figures of different machines can be compared.
+//! Points are sampled uniformly by area with a fixed seed, so that runs can be repeated. The stages are those reported
+//! to [`Progress`]. Every report describes the machine, and holds two reference measurements of the same run (a
+//! Dijkstra search, a factorisation), by which reports of different machines can be compared.
 
 mod embed;
 mod hover;
@@ -17,115 +17,15 @@ mod strips;
 mod table;
 
 use std::io::Write as _;
-use std::path::PathBuf;
-use std::time::Duration;
 
 use anyhow::Context as _;
-use clap::{Args, Subcommand};
 use plait_core::progress::Progress;
 use plait_core::weave::{Options, Session};
-
-use super::DetailArguments;
 
 use input::Input;
 use report::Report;
 
-/// Arguments of `plait bench`.
-#[derive(Debug, Args)]
-pub struct BenchArguments {
-    #[command(subcommand)]
-    command: BenchCommand,
-}
-
-#[derive(Debug, Subcommand)]
-enum BenchCommand {
-    /// Time reading a mesh and making it ready, stage by stage.
-    Open(RunArguments),
-    /// Time proposals at seeded points: a loop shown, proved best, alternatives.
-    Hover(RunArguments),
-    /// Time what follows the placement of a strip, stage by stage.
-    Strips(RunArguments),
-    /// Time the embedding of a layout woven by suggestions, stage by stage.
-    Embed(RunArguments),
-    /// All of these in one run.
-    All(RunArguments),
-    /// Write reports as one Markdown table.
-    Table(TableArguments),
-    /// Draw cost against size from reports into an SVG file.
-    Plot(PlotArguments),
-}
-
-/// Arguments of what measures.
-#[derive(Debug, Args)]
-pub struct RunArguments {
-    /// The mesh, or the name of a built-in model.
-    mesh: PathBuf,
-    /// Number of points at which proposals are timed.
-    #[arg(long, default_value_t = 200)]
-    points: usize,
-    /// Seed of the points.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Numbers of strips placed when proposals are timed; the most of them is what `strips` places.
-    #[arg(long, value_delimiter = ',', default_value = "0,4,8")]
-    strips: Vec<usize>,
-    /// Cut every triangle in four so many times beforehand.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=8))]
-    subdivide: u32,
-    /// How often what is timed as a whole is repeated.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
-    repeats: u32,
-    /// Seconds after which a series of measurements goes no further.
-    #[arg(long, default_value_t = 120.0, value_parser = seconds)]
-    limit: f64,
-    /// Number of threads; without, one per core.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
-    threads: Option<u16>,
-    /// Of hovering, time the search alone and leave out what the window adds to it.
-    #[arg(long)]
-    search_only: bool,
-    /// Of all of it, leave out embedding.
-    #[arg(long)]
-    no_embed: bool,
-    /// Leave out the yardsticks.
-    #[arg(long)]
-    no_reference: bool,
-    /// How much of the shape strips follow.
-    #[command(flatten)]
-    detail: DetailArguments,
-    /// Write JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-/// Arguments of `plait bench table`.
-#[derive(Debug, Args)]
-struct TableArguments {
-    /// Reports written with --json.
-    #[arg(required = true)]
-    reports: Vec<PathBuf>,
-}
-
-/// Arguments of `plait bench plot`.
-#[derive(Debug, Args)]
-struct PlotArguments {
-    /// Reports written with --json.
-    #[arg(required = true)]
-    reports: Vec<PathBuf>,
-    /// The SVG file to write.
-    #[arg(long)]
-    out: PathBuf,
-}
-
-impl RunArguments {
-    fn limit(&self) -> Duration {
-        Duration::from_secs_f64(self.limit)
-    }
-
-    fn most_strips(&self) -> usize {
-        self.strips.iter().copied().max().unwrap_or(0)
-    }
-}
+use super::arguments::bench::{BenchArguments, BenchCommand, RunArguments};
 
 /// Which measurements are made.
 #[derive(Debug, Clone, Copy, Default)]
@@ -136,12 +36,7 @@ struct Parts {
     embed: bool,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|s| (0.0..1e6).contains(s));
-    value.ok_or_else(|| "a number of seconds".to_owned())
-}
-
-/// Measures and writes the figures to standard output.
+/// Runs the measurements and prints the report.
 ///
 /// # Errors
 ///
@@ -164,8 +59,8 @@ pub fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
 
 fn measure(arguments: &RunArguments, parts: Parts) -> anyhow::Result<()> {
     let threads = arguments.threads.map_or(0, usize::from);
-    // All work is done inside the pool: with one thread there is then just this one.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("no threads")?;
+    // All work runs inside the pool, so that --threads 1 uses one thread in all.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("the threads cannot be started")?;
     let report = pool.install(|| measured(arguments, parts))?;
     let text = if arguments.json { serde_json::to_string_pretty(&report)? + "\n" } else { table::text(&report) };
     write(&text)
@@ -197,8 +92,8 @@ fn measured(arguments: &RunArguments, parts: Parts) -> anyhow::Result<Report> {
             woven = session()?;
         }
         match embed::measure(&mut woven, arguments, &mut report) {
-            // Beside other figures it is no reason to lose these.
-            Err(error) if parts.hover => eprintln!("plait: nothing was embedded: {error:#}"),
+            // The other measurements of the run are kept.
+            Err(error) if parts.hover => eprintln!("plait: the embedding was not measured: {error:#}"),
             other => other?,
         }
     }
@@ -220,42 +115,19 @@ mod tests {
 
     use super::*;
 
-    #[derive(Debug, Parser)]
-    struct Line {
-        #[command(flatten)]
-        bench: BenchArguments,
-    }
-
-    fn parse(line: &str) -> Result<BenchCommand, clap::Error> {
-        Line::try_parse_from(line.split(' ')).map(|l| l.bench.command)
-    }
-
-    #[test]
-    fn arguments_are_checked() {
-        let Ok(BenchCommand::Hover(run)) = parse("bench hover torus --strips 2,0 --points 3") else {
-            panic!("not hover")
-        };
-        assert_eq!((run.most_strips(), run.points, run.seed), (2, 3, 1));
-        for line in [
-            "bench",
-            "bench hover",
-            "bench fly torus",
-            "bench hover torus --threads 0",
-            "bench hover torus --subdivide 9",
-            "bench hover torus --points -1",
-            "bench open torus --limit nan",
-            "bench open torus --repeats 0",
-            "bench plot a.json",
-            "bench table",
-        ] {
-            assert!(parse(line).is_err(), "{line}");
+    fn arguments(line: &str) -> RunArguments {
+        #[derive(Debug, Parser)]
+        struct Line {
+            #[command(flatten)]
+            run: RunArguments,
         }
+        Line::try_parse_from(line.split(' ')).unwrap().run
     }
 
     #[test]
-    fn every_part_gives_its_rows() {
-        let line = "bench all torus --points 2 --strips 0,1 --repeats 1 --threads 1 --no-embed";
-        let Ok(BenchCommand::All(run)) = parse(line) else { panic!("not all") };
+    fn every_measurement_has_its_rows() {
+        let line = "all torus --points 2 --strips 0,1 --repeats 1 --threads 1 --no-embed";
+        let run = arguments(line);
         let parts = Parts { open: true, hover: true, strips: true, embed: false };
         let report = measured(&run, parts).unwrap();
         let wanted = [
@@ -275,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn subdividing_makes_four_of_each_triangle() {
+    fn subdivision_makes_four_triangles_of_each() {
         let input = Input::new("sleeve".as_ref(), 1).unwrap();
         let loaded = input.load(&Progress::new()).unwrap();
         assert_eq!((loaded.name.as_str(), loaded.mesh.n_faces()), ("sleeve", 4 * 4914));

@@ -1,14 +1,14 @@
-//! Opening: from the file to a model that is ready to be woven on.
+//! Time to open a mesh, from the file to the prepared model.
 
 use plait_core::weave::{Model, Options};
 
-use super::RunArguments;
+use super::super::arguments::bench::RunArguments;
 use super::input::Input;
 use super::report::{Report, Staged};
 
-/// The group of the rows.
+/// Group of the rows in the report.
 pub(super) const GROUP: &str = "open";
-/// All stages together.
+/// Row of the total time.
 pub(super) const READY: &str = "opened and ready";
 
 /// Opens the input several times.

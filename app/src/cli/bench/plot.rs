@@ -1,4 +1,4 @@
-//! Cost against size from several reports, on two logarithmic axes, as a picture that needs no other program.
+//! Median times of several reports against mesh size, on logarithmic axes, as SVG.
 
 use std::fmt::Write as _;
 
@@ -6,20 +6,21 @@ use super::hover::{ALTERNATIVES, PROVED, SHOWN, group};
 use super::report::Report;
 use super::{embed, open, reference, strips};
 
-/// Size of the picture and its plotting area, in pixels.
+/// Width and height of the picture, in pixels.
 const SIZE: [f64; 2] = [900.0, 600.0];
+/// Sides of the plotting area, in pixels.
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 660.0;
 const TOP: f64 = 24.0;
 const BOTTOM: f64 = 540.0;
-/// Least distance between two names beside the lines.
+/// Minimum distance of two labels beside the curves, in pixels.
 const LINE: f64 = 17.0;
 
-/// One curve: name, colour, whether it is a yardstick, and the row it shows.
+/// One curve: label, colour, whether it is a reference measurement, and the row of the reports it shows.
 struct Curve<'a> {
     name: &'a str,
     colour: &'a str,
-    yardstick: bool,
+    is_reference: bool,
     group: &'a str,
     what: &'a str,
 }
@@ -34,7 +35,7 @@ impl Curve<'_> {
     }
 }
 
-/// A logarithmic axis, from and to 1, 2 or 5 times a power of ten.
+/// A logarithmic axis; its ends are 1, 2 or 5 times a power of ten.
 struct Axis {
     low: f64,
     high: f64,
@@ -55,7 +56,7 @@ impl Axis {
         self.from + (value / self.low).ln() / (self.high / self.low).ln() * (self.to - self.from)
     }
 
-    /// Values 1 to 9 of each decade, and whether it is the first.
+    /// Ticks at 1 to 9 times each power of ten, and whether the tick is the power itself.
     fn ticks(&self) -> impl Iterator<Item = (f64, bool)> {
         let [first, last] = [self.low, self.high].map(|v| v.log10().floor() as i32);
         let range = 0.999 * self.low..1.001 * self.high;
@@ -64,10 +65,14 @@ impl Axis {
     }
 }
 
-/// The picture.
+/// The plot as SVG.
+///
+/// # Errors
+///
+/// When the reports hold no row that is plotted.
 pub(super) fn svg(reports: &[Report]) -> anyhow::Result<String> {
     let bare = group(0);
-    let curve = |name, colour, yardstick, group, what| Curve { name, colour, yardstick, group, what };
+    let curve = |name, colour, is_reference, group, what| Curve { name, colour, is_reference, group, what };
     let curves = [
         curve("opened and ready", "#7b4fa3", false, open::GROUP, open::READY),
         curve("a loop shown", "#1b7f3b", false, &bare, SHOWN),
@@ -80,7 +85,7 @@ pub(super) fn svg(reports: &[Report]) -> anyhow::Result<String> {
     ];
     let drawn: Vec<(&Curve, Vec<[f64; 2]>)> =
         curves.iter().map(|c| (c, c.values(reports))).filter(|c| !c.1.is_empty()).collect();
-    anyhow::ensure!(!drawn.is_empty(), "the reports hold nothing to draw: write them with `plait bench all … --json`");
+    anyhow::ensure!(!drawn.is_empty(), "the reports hold nothing to plot; write them with `plait bench all … --json`");
     let all = drawn.iter().flat_map(|c| &c.1);
     let x = Axis::over(all.clone().map(|v| v[0]), LEFT, RIGHT);
     let y = Axis::over(all.map(|v| v[1]), BOTTOM, TOP);
@@ -126,14 +131,14 @@ fn axes(out: &mut String, x: &Axis, y: &Axis) {
     );
 }
 
-/// A power of ten, in thousands or millions where that is shorter.
+/// A power of ten with a unit for thousands or millions.
 fn short(value: f64, units: [&str; 3]) -> String {
     let (scale, unit) = match value {
         v if v > 0.999e6 => (1e6, units[2]),
         v if v > 0.999e3 => (1e3, units[1]),
         _ => (1.0, units[0]),
     };
-    // Rounded, as powers of ten are not exact.
+    // Rounded, since powers of ten are not exact in floating point.
     let value = value / scale;
     let text = if value < 0.999 { format!("{value:.3}") } else { format!("{value:.0}") };
     let text = if text.contains('.') { text.trim_end_matches('0') } else { &text };
@@ -146,7 +151,7 @@ fn lines(out: &mut String, drawn: &[(&Curve, Vec<[f64; 2]>)], x: &Axis, y: &Axis
         let points: Vec<[f64; 2]> = values.iter().map(|v| [x.at(v[0]), y.at(v[1])]).collect();
         let path: Vec<String> = points.iter().map(|p| format!("{:.1},{:.1}", p[0], p[1])).collect();
         let colour = curve.colour;
-        let dash = if curve.yardstick { " stroke-dasharray=\"6 4\"" } else { "" };
+        let dash = if curve.is_reference { " stroke-dasharray=\"6 4\"" } else { "" };
         let _ = writeln!(
             out,
             "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"{dash}/>",
@@ -159,7 +164,7 @@ fn lines(out: &mut String, drawn: &[(&Curve, Vec<[f64; 2]>)], x: &Axis, y: &Axis
             names.push((end[0], end[1], curve));
         }
     }
-    // Names stand beside the ends of their lines, from top to bottom, moved apart where they would touch.
+    // Labels stand at the ends of their curves, in order from top to bottom, moved apart where they would overlap.
     names.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut places: Vec<f64> = names.iter().map(|n| n.1).collect();
     for i in 1..places.len() {
@@ -189,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_series_is_drawn_within_the_axes() {
+    fn every_curve_lies_within_the_axes() {
         let mut reports = Vec::new();
         for (triangles, time) in [(1250, 0.02), (20_000, 4.0), (1_280_000, 3500.0)] {
             let mut report = Report::new(1);

@@ -1,21 +1,20 @@
-//! Points of a surface, uniform by area and the same for the same seed.
+//! Random points of a surface, uniform by area, reproducible by seed.
 
 use std::f64::consts::TAU;
 
 use plait_core::mesh::{FaceId, TriMesh};
-use plait_core::surface::Metric;
-use plait_core::surface::{SurfacePoint, trace_geodesic};
+use plait_core::surface::{Metric, SurfacePoint, trace_geodesic};
 
 /// A sequence of random points.
 #[derive(Debug)]
 pub(super) struct Points {
-    /// Area of the triangles up to each one.
+    /// Cumulative area of the triangles.
     sums: Vec<f64>,
     state: u64,
 }
 
 impl Points {
-    /// The sequence of `seed` on `mesh`.
+    /// The sequence on `mesh` with this seed.
     pub(super) fn new(mesh: &TriMesh, seed: u64) -> Self {
         let sums = mesh.faces().scan(0.0, |sum, f| {
             *sum += mesh.face_area(f);
@@ -24,7 +23,7 @@ impl Points {
         Self { sums: sums.collect(), state: seed }
     }
 
-    /// The next number in `0..1`, by SplitMix64.
+    /// The next random number in `0..1`, by SplitMix64.
     fn unit(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.state;
@@ -44,7 +43,7 @@ impl Points {
         SurfacePoint { face: FaceId::new(face), weights: [1.0 - a - b, a, b] }
     }
 
-    /// Neighbouring points, `step` apart along a straight line in some direction, as a moving pointer meets them.
+    /// Points `step` apart along a geodesic in a random direction, like those under a moving pointer.
     pub(super) fn stroke(&mut self, mesh: &TriMesh, metric: &Metric, count: usize, step: f64) -> Vec<SurfacePoint> {
         let start = self.point().nearest_vertex(mesh);
         let angle = self.unit() * TAU;

@@ -1,4 +1,4 @@
-//! Yardsticks from the same run, so that figures of different machines can be compared as ratios.
+//! Reference measurements of the same run, so that reports of different machines can be compared as ratios.
 
 use std::time::{Duration, Instant};
 
@@ -6,17 +6,17 @@ use plait_core::mesh::{TriMesh, VertexId};
 use plait_core::solve::{SparseHermitian, SpdSymbolic};
 use plait_core::weave::Model;
 
-use super::RunArguments;
+use super::super::arguments::bench::RunArguments;
 use super::report::Report;
 
-/// The group of the rows.
+/// Group of the rows in the report; the name stays, since stored reports have it.
 pub(super) const GROUP: &str = "yardsticks";
-/// One search over everything.
+/// Row of one search over the whole graph.
 pub(super) const DIJKSTRA: &str = "plain Dijkstra over the graph";
-/// One factorization, its analysis included.
+/// Row of one factorisation, symbolic analysis included.
 pub(super) const FACTORED: &str = "mesh Laplacian analysed and factored";
 
-/// Times both.
+/// Times both references.
 pub(super) fn measure(model: &Model, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
     let dijkstra = repeated(arguments, || {
         std::hint::black_box(model.graph.eccentricity(VertexId(0)));
@@ -43,14 +43,15 @@ fn repeated(arguments: &RunArguments, mut work: impl FnMut() -> anyhow::Result<(
     Ok(times)
 }
 
-/// The Laplacian of the mesh's edges, grounded a little everywhere. The cost of factoring it comes from its pattern
-/// alone; so all weights are 1, which no shape of triangle can spoil.
+/// The graph Laplacian of the mesh, with a small diagonal term that makes it positive definite. The cost of its
+/// factorisation depends on the sparsity pattern alone, so all weights are 1: no triangle shape makes it indefinite.
 fn laplacian(mesh: &TriMesh) -> SparseHermitian<f64> {
-    const GROUND: f64 = 1e-6;
+    /// Diagonal term, relative to the edge weights; chosen by hand.
+    const SHIFT: f64 = 1e-6;
     let edges = mesh.edges().flat_map(|e| {
         let [a, b] = mesh.edge_vertices(e).map(|v| v.0);
         [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0)]
     });
-    let triplets: Vec<(u32, u32, f64)> = mesh.vertices().map(|v| (v.0, v.0, GROUND)).chain(edges).collect();
+    let triplets: Vec<(u32, u32, f64)> = mesh.vertices().map(|v| (v.0, v.0, SHIFT)).chain(edges).collect();
     SparseHermitian::from_triplets(mesh.n_vertices(), &triplets)
 }

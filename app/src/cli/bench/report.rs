@@ -1,4 +1,4 @@
-//! The figures of one run.
+//! The results of one benchmark run.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::machine::{Machine, Program};
 
-/// The figures of one run, with all they depend on.
+/// The results of one run, with everything they depend on. Written and read as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Report {
     pub(super) program: Program,
@@ -22,11 +22,11 @@ pub(super) struct Report {
     pub(super) mesh: MeshFacts,
     pub(super) graph: GraphFacts,
     pub(super) rows: Vec<Row>,
-    /// The most memory held, in bytes, where the system tells it.
+    /// Peak memory in bytes; `None` if the system does not tell.
     pub(super) peak_memory: Option<u64>,
 }
 
-/// The mesh measured.
+/// The mesh of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct MeshFacts {
     pub(super) name: String,
@@ -34,14 +34,14 @@ pub(super) struct MeshFacts {
     pub(super) triangles: usize,
     pub(super) genus: usize,
     pub(super) boundary_loops: usize,
-    /// How often its triangles were cut in four.
+    /// Number of subdivisions applied to it.
     pub(super) subdivided: u32,
-    /// Triangles of the proxy that is woven on, if there is one.
+    /// Number of triangles of the proxy, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) proxy: Option<usize>,
 }
 
-/// The search graph.
+/// Size of the search graph (section 8.2).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct GraphFacts {
     /// Directed edges of `g`, the states of the search.
@@ -51,7 +51,7 @@ pub(super) struct GraphFacts {
     pub(super) bytes: usize,
 }
 
-/// What the values of a row are.
+/// Unit of the values of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Unit {
@@ -60,10 +60,10 @@ pub(super) enum Unit {
     Number,
 }
 
-/// One thing measured several times.
+/// One repeated measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
-    /// What it belongs to.
+    /// Group of rows it belongs to.
     pub(super) group: String,
     pub(super) what: String,
     pub(super) unit: Unit,
@@ -90,7 +90,7 @@ impl Report {
         }
     }
 
-    /// Says what was measured.
+    /// Fills in mesh and graph.
     pub(super) fn describe(&mut self, model: &Model, subdivided: u32) {
         self.mesh = MeshFacts {
             name: model.loaded.name.clone(),
@@ -109,7 +109,7 @@ impl Report {
     pub(super) fn add(&mut self, group: &str, what: &str, unit: Unit, mut values: Vec<f64>) {
         values.sort_by(f64::total_cmp);
         let Some(last) = values.len().checked_sub(1) else { return };
-        // The value with at least this share of all values up to it.
+        // The smallest value that at least this share of the values does not exceed.
         let at = |q: f64| values[((values.len() as f64 * q).ceil() as usize).clamp(1, values.len()) - 1];
         self.rows.push(Row {
             group: group.into(),
@@ -142,16 +142,16 @@ impl Report {
     }
 }
 
-/// Times of work in stages, repeated.
+/// Repeated times of work, by stage.
 #[derive(Debug, Default)]
 pub(super) struct Staged {
     totals: Vec<Duration>,
-    /// Stages in the order met, with milliseconds of each repetition.
+    /// Stages in order of appearance, with the milliseconds of each repetition.
     stages: Vec<(String, Vec<f64>)>,
 }
 
 impl Staged {
-    /// Times `work`, which reports its stages to what it is given.
+    /// Times `work`, which reports its stages to the [`Progress`].
     pub(super) fn time<T, E>(&mut self, work: impl FnOnce(&Progress) -> Result<T, E>) -> Result<T, E> {
         let progress = Progress::new();
         let start = Instant::now();
@@ -166,19 +166,19 @@ impl Staged {
         Ok(result)
     }
 
-    /// Each repetition as a whole.
+    /// Total time of each repetition.
     pub(super) fn totals(&self) -> &[Duration] {
         &self.totals
     }
 
-    /// How long all repetitions took together.
+    /// Sum over all repetitions.
     pub(super) fn spent(&self) -> Duration {
         self.totals.iter().sum()
     }
 
-    /// Adds a row for each stage, and one called `total` for all together.
+    /// Adds a row for each stage, and one called `total`.
     pub(super) fn write(self, report: &mut Report, group: &str, total: &str) {
-        // A stage that another one follows at once has no work of its own.
+        // A stage that is followed by another at once did no work of its own.
         let works = |values: &[f64]| values.iter().any(|&ms| ms > 0.01);
         for (stage, values) in self.stages.into_iter().filter(|s| works(&s.1)) {
             report.add(group, &stage, Unit::Milliseconds, values);
@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_values_that_were_met() {
+    fn percentiles_are_measured_values() {
         let mut report = Report::new(1);
         report.add("g", "all", Unit::Number, (1..=100).rev().map(f64::from).collect());
         report.add("g", "one", Unit::Number, vec![3.0]);

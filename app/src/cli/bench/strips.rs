@@ -1,33 +1,33 @@
-//! Placing strips, and all that follows from one more.
+//! Time to place a strip, with everything that is recomputed.
 
 use plait_core::progress::Progress;
 use plait_core::weave::{Proposal, Session, StripId, WeaveError};
 
-use super::RunArguments;
+use super::super::arguments::bench::RunArguments;
 use super::points::Points;
 use super::report::{Report, Staged};
 
-/// The group of the rows.
+/// Group of the rows in the report.
 pub(super) const GROUP: &str = "strips";
-/// All stages together.
+/// Row of the total time.
 pub(super) const PLACED: &str = "placed";
 
-/// Points tried until one has a proposal.
+/// Points to try until one has a proposal.
 const TRIES: usize = 100;
 
-/// The best loops at random points, one after the other.
+/// Places the best loop at random points, one after the other.
 #[derive(Debug)]
 pub(super) struct Placements {
     points: Points,
 }
 
 impl Placements {
-    /// The placements of a seed; their points are others than those at which proposals are timed.
+    /// Placements with the points of a seed. The points differ from those at which proposals are timed.
     pub(super) fn new(session: &Session, seed: u64) -> Self {
         Self { points: Points::new(&session.model().loaded.mesh, !seed) }
     }
 
-    /// Has `place` place the next strip; tells whether there was one.
+    /// Calls `place` with the best proposal at the next point that has one; false after [`TRIES`] points without.
     pub(super) fn place(
         &mut self,
         session: &mut Session,
@@ -45,7 +45,7 @@ impl Placements {
     }
 }
 
-/// Places strips, and removes the last again.
+/// Times the placement of strips, and the removal of the last.
 pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
     let mut placements = Placements::new(session, arguments.seed);
     let (mut placed, mut removed) = (Staged::default(), Staged::default());

@@ -1,4 +1,4 @@
-//! Reports as text: one in full, or several side by side as a Markdown table.
+//! Reports as text: one in full, or the main results of several as a Markdown table.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use super::hover::{ALTERNATIVES, PROVED, SHOWN, group};
 use super::report::{Report, Row, Unit};
 use super::{embed, open, reference, strips};
 
-/// All figures of a report, for a terminal.
+/// All results of a report, for a terminal.
 pub(super) fn text(report: &Report) -> String {
     let (mesh, graph) = (&report.mesh, &report.graph);
     let mut text = format!(
@@ -42,7 +42,7 @@ pub(super) fn text(report: &Report) -> String {
     text
 }
 
-/// The figures that matter most, a line for each report.
+/// The main results, one line per report.
 pub(super) fn markdown(reports: &[Report]) -> String {
     let bare = group(0);
     let both = |r: &Row| format!("{} / {}", figure(r.median), figure(r.p95));
@@ -95,7 +95,7 @@ fn megabytes(bytes: Option<u64>) -> String {
     bytes.map(|b| format!("{} MB", figure(b as f64 / 1e6))).unwrap_or_default()
 }
 
-/// Three digits, but all of those before the point.
+/// At least three significant digits, and all digits before the point.
 fn figure(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),

@@ -1,16 +1,16 @@
-//! Nodes that belong on features.
+//! Attachment of nodes to features.
 //!
-//! A layout ties nodes to features by their arcs: where a chain of arcs leads from a corner along a feature to a node, that
-//! node has the feature's coordinate, and a map in which the feature is an isoline squeezes all that lies between both to
-//! nothing. What is squeezed tells which nodes these are: they are brought onto the feature, along edges and with their
-//! arcs in tow, and slide along it from then on. Regular nodes follow if their crossing lies on one.
+//! Arcs tie nodes to features: if a chain of arcs runs from a corner of a feature along it to a node, the node has the
+//! constant coordinate of the feature, and a map in which the feature is an isoline squeezes all triangles between
+//! both. Squeezed triangles therefore reveal such nodes; distance on the surface does not. They are moved onto the
+//! feature, along edges and with their arcs, and stay on it from then on. Unconstrained regular nodes follow if their
+//! crossing lies on a feature.
 
 use glam::DVec2;
 
-use crate::embed::EmbeddingError;
-use crate::embed::optimise::isoline_crossing::crossing;
+use crate::embed::error::EmbeddingError;
+use crate::embed::optimise::isoline_crossing::{crossing, search_outward};
 use crate::embed::optimise::optimiser::Optimiser;
-use crate::embed::optimise::regular_nodes::outward;
 use crate::embed::optimise::relocation::{NodeConstraint, edge_path};
 use crate::embed::parameterise::feature_axes;
 use crate::embed::parameterise::state::State;
@@ -18,21 +18,24 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::progress::Progress;
 
-/// To what share of its width on the surface what lies between a node and its feature is squeezed in the map.
+/// Largest ratio of the distance between a constrained node and its feature in the map to their distance on the
+/// surface, both in lengths of the feature edge, at which the node is attached. Chosen by hand.
 const SQUEEZED: f64 = 0.1;
-/// How near to an edge of a feature, in its lengths, the crossing of a regular node lies that belongs there.
+/// Largest distance in the map, in lengths of the feature edge, of the crossing of a regular node at which it is
+/// attached.
 const NEAR: f64 = 0.1;
-/// How many times as far as it steps a node may be from a line of features that steps because of it.
-const STEPPED: f64 = 1.2;
+/// Largest ratio of the distance of a node from a stepping line to the step, both in the map, at which the node is
+/// attached: equality with some tolerance.
+const STEP_RATIO: f64 = 1.2;
 
-/// The foot of a point on an edge, in the map.
+/// The foot of the perpendicular from a point to an edge, in the map.
 struct Foot {
     halfedge: HalfedgeId,
-    /// Where on the edge it is, from 0 to 1.
+    /// Its position on the edge's line, 0 at the origin of the half-edge and 1 at its target.
     along: f64,
-    /// How far the point is from the edge's line.
+    /// Distance of the point from the line.
     far: f64,
-    /// The length of the edge.
+    /// Length of the edge.
     length: f64,
 }
 
@@ -44,7 +47,7 @@ impl Foot {
         Self { halfedge, along: from.dot(side) / length.powi(2), far: from.perp_dot(side).abs() / length, length }
     }
 
-    /// How far the point is from the edge.
+    /// Distance of the point from the edge.
     fn distance(&self) -> f64 {
         let beyond = (self.along - self.along.clamp(0.0, 1.0)) * self.length;
         beyond.hypot(self.far)
@@ -54,165 +57,177 @@ impl Foot {
         (0.0..=1.0).contains(&self.along)
     }
 
-    /// The end of the edge that is nearer.
+    /// The nearer end of the edge.
     fn end(&self, state: &State) -> VertexId {
-        let mesh = &state.net.mesh;
+        let mesh = &state.topology.mesh;
         if self.along < 0.5 { mesh.origin(self.halfedge) } else { mesh.target(self.halfedge) }
     }
 }
 
-/// A place on a feature: a vertex, and the triangles on the way back from there.
-struct Place {
+/// The vertex on a feature that a node is to be attached to.
+struct Target {
     vertex: VertexId,
+    /// Adjacent triangles from there back to the node.
     strip: Vec<FaceId>,
 }
 
+/// A feature line at whose relaxed edges the constant coordinate steps.
+struct SteppingLine {
+    edges: Vec<HalfedgeId>,
+    /// The largest step.
+    step: f64,
+}
+
 impl Optimiser<'_> {
-    /// Brings nodes onto the features from which what lies between is squeezed away; returns how many.
+    /// Attaches nodes to features from which squeezed triangles separate them; returns their number.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub(in crate::embed) fn attach(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
+    pub(super) fn attach_nodes(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
         let beside = |i: usize, h: HalfedgeId, at: DVec2| self.squeezed_to(i, h, at);
-        let places = (0..self.pace.len()).map(|i| self.place_of(i, beside)).collect();
-        self.bring(places, progress)
+        let targets = (0..self.step_factor.len()).map(|i| self.target_of(i, beside)).collect();
+        self.move_to_targets(targets, progress)
     }
 
-    /// Brings nodes onto lines of features that step from one isoline to another at edges let go, where they are no
-    /// farther from the line than it steps: the line leaves the isoline of such a node to pass it. Returns how many.
+    /// Attaches irregular nodes to feature lines that step from one isoline to another at relaxed edges, if the node is
+    /// no farther from the line than it steps: such a line leaves the isoline of the node in order to pass it. Returns
+    /// their number.
     ///
     /// # Errors
     ///
     /// See [`EmbeddingError`].
-    pub(in crate::embed) fn attach_at_steps(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
+    pub(super) fn attach_nodes_at_steps(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
         let lines = self.stepping_lines();
-        let places = (0..self.pace.len()).map(|i| self.place_at_step(i, &lines)).collect();
-        self.bring(places, progress)
+        let targets = (0..self.step_factor.len()).map(|i| self.target_at_step(i, &lines)).collect();
+        self.move_to_targets(targets, progress)
     }
 
-    /// The lines of features that step at edges let go, and how far at most.
-    fn stepping_lines(&self) -> Vec<(Vec<HalfedgeId>, f64)> {
-        let State { net, solution, .. } = &self.state;
-        let mut step = vec![0.0; net.mesh.n_edges()];
-        for (h, axis) in self.aligned().into_iter().filter(|&(h, _)| self.loose[net.mesh.edge(h).index()]) {
+    fn stepping_lines(&self) -> Vec<SteppingLine> {
+        let State { topology, solution, .. } = &self.state;
+        let mut step = vec![0.0; topology.mesh.n_edges()];
+        for (h, axis) in self.feature_edges().into_iter().filter(|&(h, _)| self.relaxed[topology.mesh.edge(h).index()])
+        {
             let [p, q] = [h.index() % 3, (h.index() + 1) % 3].map(|k| solution.map.uv[h.index() / 3][k]);
-            step[net.mesh.edge(h).index()] = (q - p)[usize::from(axis)].abs();
+            step[topology.mesh.edge(h).index()] = (q - p)[usize::from(axis)].abs();
         }
-        let farthest = |line: &[HalfedgeId]| line.iter().map(|&h| step[net.mesh.edge(h).index()]).fold(0.0, f64::max);
-        let lines = feature_axes::lines(net, &self.sharp).into_iter();
-        lines.map(|line| (farthest(&line), line)).filter(|l| l.0 > 0.0).map(|(far, line)| (line, far)).collect()
+        let largest =
+            |line: &[HalfedgeId]| line.iter().map(|&h| step[topology.mesh.edge(h).index()]).fold(0.0, f64::max);
+        let lines = feature_axes::lines(topology, &self.sharp).into_iter();
+        lines.map(|edges| SteppingLine { step: largest(&edges), edges }).filter(|l| l.step > 0.0).collect()
     }
 
-    /// The place of an irregular node on one of these lines, that nearest on the surface, if it is no farther from it in
-    /// the map than the line steps.
-    fn place_at_step(&self, i: usize, lines: &[(Vec<HalfedgeId>, f64)]) -> Option<Place> {
-        let State { net, .. } = &self.state;
-        let mesh = &net.mesh;
-        if net.nodes[i].is_regular() {
+    /// The target of an irregular node on a stepping line: the free vertex nearest on the surface.
+    fn target_at_step(&self, i: usize, lines: &[SteppingLine]) -> Option<Target> {
+        let State { topology, .. } = &self.state;
+        let mesh = &topology.mesh;
+        if topology.nodes[i].is_regular() {
             return None;
         }
         let line_of =
-            |h: HalfedgeId| lines.iter().position(|(line, _)| line.iter().any(|&l| mesh.edge(l) == mesh.edge(h)));
+            |h: HalfedgeId| lines.iter().position(|line| line.edges.iter().any(|&l| mesh.edge(l) == mesh.edge(h)));
         let mut found = None;
-        self.place_of(i, |_, h, at| {
+        self.target_of(i, |_, h, at| {
             let line = line_of(h)?;
-            let near = Foot::new(&self.state, h, at).distance() <= STEPPED * lines[line].1;
+            let near = Foot::new(&self.state, h, at).distance() <= STEP_RATIO * lines[line].step;
             found = near.then_some(line);
             near.then(|| mesh.origin(h))
         })?;
-        let from = mesh.position(net.nodes[i].vertex);
+        let from = mesh.position(topology.nodes[i].vertex);
         let far = |v: &VertexId| mesh.position(*v).distance_squared(from);
-        let vertices = lines[found?].0.iter().map(|&h| mesh.origin(h));
+        let vertices = lines[found?].edges.iter().map(|&h| mesh.origin(h));
         let vertex = vertices.filter(|&v| self.is_free(v)).min_by(|v, w| far(v).total_cmp(&far(w)))?;
-        let around = mesh.outgoing(net.nodes[i].vertex).map(|h| (mesh.face(h), DVec2::ZERO));
+        // The search is for a vertex, so that the coordinates do not matter.
+        let around = mesh.outgoing(topology.nodes[i].vertex).map(|h| (mesh.face(h), DVec2::ZERO));
         let at_vertex = |f: FaceId, _| mesh.face_vertices(f).contains(&vertex).then_some(());
-        let ((), strip) = outward(net, &self.state.solution.map, around, at_vertex)?;
-        Some(Place { vertex, strip })
+        let ((), strip) = search_outward(topology, &self.state.solution.map, around, at_vertex)?;
+        Some(Target { vertex, strip })
     }
 
-    /// Brings nodes to their places, if they have one and the map does not fold there; returns how many.
-    fn bring(&mut self, places: Vec<Option<Place>>, progress: &Progress) -> Result<usize, EmbeddingError> {
-        if places.iter().all(Option::is_none) {
+    /// Moves nodes to their targets, but for those around which triangles would flip; returns the number moved.
+    fn move_to_targets(&mut self, targets: Vec<Option<Target>>, progress: &Progress) -> Result<usize, EmbeddingError> {
+        if targets.iter().all(Option::is_none) {
             return Ok(0);
         }
-        let brought = |this: &Self, _: &[u32], stays: &[bool]| this.brought(&places, stays);
-        let (found, _) = self.as_far_as_possible(brought, vec![false; self.pace.len()], progress)?;
+        let moved = |this: &Self, _: &[u32], stays: &[bool]| this.with_nodes_at_targets(&targets, stays);
+        let (found, _) = self.solve_moved(moved, vec![false; self.step_factor.len()], progress)?;
         let Some(state) = found else {
             self.synchronise(progress)?;
             return Ok(0);
         };
         let mut count = 0;
-        for (i, place) in places.iter().enumerate() {
-            if place.as_ref().is_some_and(|p| state.net.nodes[i].vertex == p.vertex) {
-                self.ground.hold[i] = NodeConstraint::Curve;
+        for (i, target) in targets.iter().enumerate() {
+            if target.as_ref().is_some_and(|t| state.topology.nodes[i].vertex == t.vertex) {
+                self.projection.node_constraint[i] = NodeConstraint::Curve;
                 count += 1;
             }
         }
-        tracing::debug!(count, "nodes brought onto features");
+        tracing::debug!(count, "nodes attached to features");
         self.state = state;
         Ok(count)
     }
 
-    /// The net with nodes at their places but for those that stay.
-    fn brought(&self, places: &[Option<Place>], stays: &[bool]) -> EmbeddingTopology {
-        let mut net = self.state.net.clone();
-        for (i, place) in places.iter().enumerate() {
-            let Some(Place { vertex, strip }) = place.as_ref().filter(|_| !stays[i]) else { continue };
-            let from = net.nodes[i].vertex;
-            let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
+    /// The topology with nodes at their targets, but for those that `stays` marks.
+    fn with_nodes_at_targets(&self, targets: &[Option<Target>], stays: &[bool]) -> EmbeddingTopology {
+        let mut topology = self.state.topology.clone();
+        for (i, target) in targets.iter().enumerate() {
+            let Some(Target { vertex, strip }) = target.as_ref().filter(|_| !stays[i]) else { continue };
+            let from = topology.nodes[i].vertex;
+            let taken: Vec<VertexId> = topology.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
             if taken.contains(vertex) {
                 continue;
             }
-            if let Some(path) = edge_path(&net.mesh, strip, from, *vertex, |v| taken.contains(&v)) {
-                net.mesh.set_position(from, self.ground.home[from.index()]);
-                path.into_iter().for_each(|h| net.move_node(i, h));
+            if let Some(path) = edge_path(&topology.mesh, strip, from, *vertex, |v| taken.contains(&v)) {
+                topology.mesh.set_position(from, self.projection.rest_position[from.index()]);
+                path.into_iter().for_each(|h| topology.move_node(i, h));
             }
         }
-        net
+        topology
     }
 
-    /// The place on a feature that a free node belongs to, if any: the first that `beside` names, given the node, an edge
-    /// of a feature and the coordinates that the node is to have in the frame of the edge's triangle.
-    fn place_of(
+    /// The target of a free node, if it has one: the first vertex that `beside` returns in a search outward from the
+    /// node, given the node, a feature edge and the coordinates the node is to have, in the chart of the edge's
+    /// triangle.
+    fn target_of(
         &self,
         i: usize,
         mut beside: impl FnMut(usize, HalfedgeId, DVec2) -> Option<VertexId>,
-    ) -> Option<Place> {
-        let State { net, solution, .. } = &self.state;
-        let (mesh, map) = (&net.mesh, &solution.map);
-        if self.ground.hold[i] != NodeConstraint::Free {
+    ) -> Option<Target> {
+        let State { topology, solution, .. } = &self.state;
+        let (mesh, map) = (&topology.mesh, &solution.map);
+        if self.projection.node_constraint[i] != NodeConstraint::Free {
             return None;
         }
         let corners: Vec<(HalfedgeId, DVec2)> = if self.through_arcs.constrained[i] {
             let own = |h: HalfedgeId| (h, map.uv[h.index() / 3][h.index() % 3]);
-            mesh.outgoing(net.nodes[i].vertex).map(own).collect()
+            mesh.outgoing(topology.nodes[i].vertex).map(own).collect()
         } else {
-            crossing(net, &self.through_arcs, map, &self.ends[i]).into_iter().collect()
+            crossing(topology, &self.through_arcs, map, &self.half_arcs[i]).into_iter().collect()
         };
         let first = corners.into_iter().map(|(h, at)| (mesh.face(h), at));
-        let (vertex, strip) = outward(net, map, first, |f, at| {
+        let (vertex, strip) = search_outward(topology, map, first, |f, at| {
             let features = mesh.face_halfedges(f).into_iter().filter(|&h| self.sharp[mesh.edge(h).index()]);
             features.into_iter().find_map(|h| beside(i, h, at))
         })?;
-        self.is_free(vertex).then_some(Place { vertex, strip })
+        self.is_free(vertex).then_some(Target { vertex, strip })
     }
 
-    /// The nearer end of an edge of a feature if a node belongs there because what lies between is squeezed.
+    /// The nearer end of a feature edge if the triangles between it and the node are squeezed.
     fn squeezed_to(&self, i: usize, h: HalfedgeId, at: DVec2) -> Option<VertexId> {
-        let mesh = &self.state.net.mesh;
+        let mesh = &self.state.topology.mesh;
         let foot = Foot::new(&self.state, h, at);
-        // Of a node that is held the coordinates are its own, and what counts is how far it is on the surface.
-        let far = mesh.position(self.state.net.nodes[i].vertex).distance(mesh.position(mesh.origin(h)));
+        // A constrained node has coordinates of its own, to be compared with its distance on the surface. The
+        // coordinates of an unconstrained one are those of its crossing.
+        let far = mesh.position(self.state.topology.nodes[i].vertex).distance(mesh.position(mesh.origin(h)));
         let near = if self.through_arcs.constrained[i] { SQUEEZED * far / mesh.vector(h).length() } else { NEAR };
         (foot.is_inside() && foot.far < near * foot.length).then(|| foot.end(&self.state))
     }
 
-    /// Whether a vertex on a feature may have a node: no corner of features, and no other's place.
+    /// Whether a vertex on a feature may have a node: it is no end or crossing of features, and no other node is there.
     fn is_free(&self, v: VertexId) -> bool {
-        let mesh = &self.state.net.mesh;
+        let mesh = &self.state.topology.mesh;
         let rays = mesh.outgoing(v).filter(|&h| self.sharp[mesh.edge(h).index()]).count();
-        rays == 2 && !mesh.is_boundary_vertex(v) && self.state.net.nodes.iter().all(|n| n.vertex != v)
+        rays == 2 && !mesh.is_boundary_vertex(v) && self.state.topology.nodes.iter().all(|n| n.vertex != v)
     }
 }
 
@@ -222,7 +237,7 @@ mod tests {
     use crate::embed::topology::testing::net;
 
     #[test]
-    fn a_point_is_as_far_from_an_edge_as_from_its_nearest_point() {
+    fn distance_of_a_point_from_an_edge() {
         let halfedge = net().mesh.halfedges().next().unwrap();
         let at = |along: f64, far: f64| Foot { halfedge, along, far, length: 2.0 };
         assert_eq!(at(0.3, 0.5).distance(), 0.5);

@@ -1,16 +1,19 @@
-//! Where maps without folds start: from the drawing of a layout, from another map, from a guess.
+//! The start of the injective phase: from the initial embedding, from a least-squares map, or from the map of a coarser
+//! mesh.
 //!
-//! A drawing with every patch mapped one to one onto its rectangle, opposite sides of equal length, is a seamless map of
-//! the whole surface without folds, however bad its shape. From there the energy of [`crate::param::InjectiveEnergy`] is
-//! made less, with the arcs free to move across the surface: only that they are isolines is kept.
+//! An initial embedding with every patch mapped bijectively onto its rectangle, with opposite sides of equal length, is
+//! an injective seamless map of the whole surface, whatever its distortion. From any start the energy
+//! ([`InjectiveEnergy`](crate::param::InjectiveEnergy)) is descended with arcs constrained to isolines but otherwise
+//! free to move on the surface.
 
 use glam::{DVec2, DVec3};
 
 use crate::dual::{Mark, RefinedMesh};
-use crate::embed::EmbeddingError;
-use crate::embed::optimise::optimiser::{Known, Optimiser};
-use crate::embed::parameterise::solve::{Aim, Features, Folded, Start};
-use crate::embed::parameterise::state::State;
+use crate::embed::error::EmbeddingError;
+use crate::embed::optimise::optimiser::Optimiser;
+use crate::embed::optimise::setup::PreparedTopology;
+use crate::embed::parameterise::injective::{Flipped, InitialMap};
+use crate::embed::parameterise::solve::{FeatureConstraint, MapKind};
 use crate::embed::problem::{Problem, Surface};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::field::is_feature_dominated;
@@ -20,25 +23,94 @@ use crate::param::DistortionWeights;
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
-/// A drawing on a mesh of its own, with a map of each triangle in the chart of its patch.
-pub(in crate::embed) struct Drawn {
-    /// The surface with all arcs as edge paths.
-    pub mesh: TriMesh,
-    /// Triangle of the original surface that each triangle lies in.
-    pub base_face: Vec<u32>,
-    /// The layout drawn on it.
-    pub embedding: Embedding,
-    /// The coordinates of the corners of each triangle, in the chart of its patch.
-    pub uv: Vec<[DVec2; 3]>,
+/// Weight λ of the size term of the energy: large enough to keep limbs and the patches of one chord from shrinking to
+/// nothing, small enough not to distort angles. Measured with 0.06, 0.03 and 0.02: the conformal distortion of botijo
+/// (99 patches) is 2.064, 2.056 and 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with a strength of principal
+/// directions of 3.4.
+const SIZE_WEIGHT: f64 = 0.02;
+/// The same for surfaces whose shape is given by features, whose constraints squeeze the triangles between them: with
+/// less, some features of the fan disk cannot be constrained.
+const SIZE_WEIGHT_FEATURES: f64 = 0.06;
+/// Largest number of Newton steps of the first map; it has converged long before.
+const FIRST_NEWTON_STEPS: usize = 60;
+
+impl<'a> Optimiser<'a> {
+    /// Sets up the injective phase from the harmonic maps of the patches of the initial embedding. The result is
+    /// [`Flipped`] if these flip triangles.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(in crate::embed) fn from_initial_embedding(
+        problem: &Problem<'a>,
+        progress: &Progress,
+    ) -> Result<Result<Self, Flipped>, EmbeddingError> {
+        let Problem { surface, layout, initial_embedding, arc_headings, .. } = *problem;
+        let mapped = MappedEmbedding::new(layout, initial_embedding, progress)?;
+        let mut topology = EmbeddingTopology::new(&mapped.mesh, &mapped.embedding, layout, arc_headings)?;
+        for f in &mut topology.base_face {
+            *f = FaceId(mapped.base_face[f.index()]);
+        }
+        let (sharp, curvature) = (mapped.sharp(&surface), mapped.curvature(&surface));
+        let prepared = PreparedTopology { topology, sharp, curvature };
+        let start = (InitialMap::Injective(&mapped.uv), FIRST_NEWTON_STEPS);
+        Self::injective(problem, prepared, start, 1.0, progress)
+    }
+
+    /// Sets up the injective phase from the final map of another phase. The result is [`Flipped`] if that flips
+    /// triangles which cannot be untangled.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(in crate::embed) fn from_map_of(
+        problem: &Problem<'a>,
+        other: Optimiser<'_>,
+        progress: &Progress,
+    ) -> Result<Result<Self, Flipped>, EmbeddingError> {
+        let Optimiser { state, sharp, curvature, .. } = other;
+        let prepared = PreparedTopology { topology: state.topology, sharp, curvature };
+        let start = (InitialMap::Injective(&state.solution.map.uv), FIRST_NEWTON_STEPS);
+        Self::injective(problem, prepared, start, 1.0, progress)
+    }
+
+    /// Sets up the injective phase on a prepared topology from an initial map, descended by the given number of Newton
+    /// steps, with the given penalty weight of features. The result is [`Flipped`] if there is no injective map near
+    /// the initial one.
+    ///
+    /// # Errors
+    ///
+    /// See [`EmbeddingError`].
+    pub(in crate::embed) fn injective(
+        problem: &Problem<'a>,
+        prepared: PreparedTopology,
+        (initial, steps): (InitialMap<'_>, usize),
+        penalty: f64,
+        progress: &Progress,
+    ) -> Result<Result<Self, Flipped>, EmbeddingError> {
+        let Surface { mesh, sharp, .. } = problem.surface;
+        let size = if is_feature_dominated(mesh, sharp) { SIZE_WEIGHT_FEATURES } else { SIZE_WEIGHT };
+        let distortion = DistortionWeights { anisotropy: problem.settings.anisotropy, size };
+        let kind = MapKind::Injective { distortion, initial, steps };
+        Self::with_map(problem, prepared, (kind, FeatureConstraint::Penalty(penalty)), progress)
+    }
 }
 
-impl Drawn {
-    /// Maps the patches of a drawing and puts them together again.
-    pub(in crate::embed) fn new(
-        layout: &QuadLayout,
-        initial_embedding: &Embedding,
-        progress: &Progress,
-    ) -> Result<Self, EmbeddingError> {
+/// An initial embedding with its patch maps, put together to a mesh and a seamless map of the surface.
+struct MappedEmbedding {
+    /// The surface with all arcs as edge paths.
+    mesh: TriMesh,
+    /// The triangle of the surface of the problem that each triangle lies in.
+    base_face: Vec<u32>,
+    /// The embedding on this mesh.
+    embedding: Embedding,
+    /// The coordinates of the corners of each triangle, in the chart of its patch.
+    uv: Vec<[DVec2; 3]>,
+}
+
+impl MappedEmbedding {
+    /// Maps the patches of an embedding and joins their meshes.
+    fn new(layout: &QuadLayout, initial_embedding: &Embedding, progress: &Progress) -> Result<Self, EmbeddingError> {
         let maps = map_patches(layout, initial_embedding, progress)?;
         let mut positions: Vec<DVec3> = initial_embedding.mesh.positions.clone();
         let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
@@ -73,89 +145,7 @@ impl Drawn {
         };
         Ok(Self { mesh, base_face, embedding, uv })
     }
-}
 
-/// How much size counts beside shape: enough to keep limbs and the patches of one strip from shrinking away, little enough
-/// not to be paid for by angles. With 0.06, 0.03 and 0.02 the conformal distortion of botijo (99 patches) is 2.064, 2.056 and
-/// 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with guides of 3.4.
-const SIZE: f64 = 0.02;
-/// Where features carry the shape, which squeeze what lies between them: with less some of the fan disk cannot be held.
-const SIZE_CREASED: f64 = 0.06;
-/// Steps of Newton's method for a first map: it has long converged by then.
-const STEPS: usize = 60;
-
-impl<'a> Optimiser<'a> {
-    /// Sets up an optimisation without folds that starts from the drawing. [`Folded`] if that folds itself.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(in crate::embed) fn from_drawing(
-        job: &Problem<'a>,
-        progress: &Progress,
-    ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let drawn = Drawn::new(job.layout, job.initial_embedding, progress)?;
-        let mut net = EmbeddingTopology::new(&drawn.mesh, &drawn.embedding, job.layout, job.arc_headings)?;
-        for f in &mut net.base_face {
-            *f = FaceId(drawn.base_face[f.index()]);
-        }
-        let (sharp, curvature) = (drawn.sharp(&job.surface), drawn.curvature(&job.surface));
-        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Map(&drawn.uv), steps: STEPS };
-        Self::on(job, (net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
-    }
-
-    /// The net of a drawn layout, with what is known of its mesh, and enough triangles around irregular nodes for a map
-    /// without folds.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(in crate::embed) fn finer_net(job: &Problem<'_>) -> Result<Known, EmbeddingError> {
-        let (net, sharp, curvature) = Self::net(job)?;
-        Ok(match net.refine_at_irregular_nodes(&net.angle, &sharp, &curvature)? {
-            Some((net, carried)) => (net, carried.sharp, carried.at_vertex),
-            None => (net, sharp, curvature),
-        })
-    }
-
-    /// Sets up an optimisation without folds on a net from the coordinates of the corners of each triangle in a map nearly
-    /// like those wanted, up to translations and quarter turns, in so many steps of Newton's method at most, with features
-    /// pulled so many times as hard as usual. [`Folded`] if there is no map without folds near that.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(in crate::embed) fn from_guess(
-        job: &Problem<'a>,
-        known: Known,
-        (uv, steps, pull): (&[[DVec2; 3]], usize, f64),
-        progress: &Progress,
-    ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Turned(uv), steps };
-        Self::on(job, known, (aim, Features::Pulled(pull)), progress)
-    }
-
-    /// Sets up an optimisation without folds that starts from where another has ended. [`Folded`] if that map folds.
-    ///
-    /// # Errors
-    ///
-    /// See [`EmbeddingError`].
-    pub(in crate::embed) fn from_map(
-        job: &Problem<'a>,
-        (state, sharp, curvature): (State, Vec<bool>, Vec<PrincipalCurvature>),
-        progress: &Progress,
-    ) -> Result<Result<Self, Folded>, EmbeddingError> {
-        let aim = Aim::InjectiveMap { shape: shape(job), start: Start::Map(&state.solution.map.uv), steps: STEPS };
-        Self::on(job, (state.net, sharp, curvature), (aim, Features::Pulled(1.0)), progress)
-    }
-}
-
-fn shape(job: &Problem<'_>) -> DistortionWeights {
-    let size = if is_feature_dominated(job.surface.mesh, job.surface.sharp) { SIZE_CREASED } else { SIZE };
-    DistortionWeights { anisotropy: job.settings.anisotropy, size }
-}
-
-impl Drawn {
     /// Whether each edge lies on a sharp edge of the surface.
     fn sharp(&self, surface: &Surface<'_>) -> Vec<bool> {
         let base = |h: HalfedgeId| FaceId(self.base_face[h.index() / 3]);
@@ -171,7 +161,8 @@ impl Drawn {
         self.mesh.edges().map(|e| lies(self.mesh.halfedge(e)).unwrap_or(false)).collect()
     }
 
-    /// The principal curvatures at the vertices, for those added that of the nearest corner of their triangle.
+    /// The principal curvatures at the vertices. A vertex that was added has those of the nearest corner of its base
+    /// triangle.
     fn curvature(&self, surface: &Surface<'_>) -> Vec<PrincipalCurvature> {
         let n = surface.mesh.n_vertices();
         let at = |v: VertexId| {

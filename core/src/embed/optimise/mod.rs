@@ -1,16 +1,18 @@
-//! Moving nodes to where the map's distortion is least, with features on isolines and no flipped triangles.
+//! Optimisation of node positions and features, in two phases: with a least-squares map, and with an injective map.
 //!
-//! The room may use `topology` and `parameterise`. One [`optimiser`] holds the state; the other files are its steps.
+//! The room may use `topology` and `parameterise`. [`optimiser`] holds the state; the other files are its operations:
+//! [`descent`] and [`node_steps`] move nodes, [`initial_map`] starts the injective phase, [`finalise`] ends a phase.
 
-pub(in crate::embed) mod attachment;
-pub(in crate::embed) mod feature_continuation;
-pub(in crate::embed) mod finalise;
-pub(in crate::embed) mod initial_map;
-pub(in crate::embed) mod integer_rounding;
-pub(in crate::embed) mod isoline_crossing;
-pub(in crate::embed) mod nearest_node;
-pub(in crate::embed) mod node_steps;
-pub(in crate::embed) mod optimiser;
-pub(in crate::embed) mod regular_nodes;
-pub(in crate::embed) mod relocation;
-pub(in crate::embed) mod setup;
+pub(super) mod attachment;
+pub(super) mod descent;
+pub(super) mod feature_continuation;
+pub(super) mod finalise;
+pub(super) mod initial_map;
+pub(super) mod integer_rounding;
+pub(super) mod isoline_crossing;
+pub(super) mod nearest_node;
+pub(super) mod node_steps;
+pub(super) mod optimiser;
+pub(super) mod regular_nodes;
+pub(super) mod relocation;
+pub(super) mod setup;

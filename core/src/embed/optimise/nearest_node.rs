@@ -1,4 +1,5 @@
-//! Which node is nearest to every vertex, along edges: no node leaves its cell in one step (Campen, section 6.6.2).
+//! The discrete Voronoi diagram of the nodes by Dijkstra's algorithm along edges: a step stays in the cell of its node
+//! (Campen, section 6.6.2).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,14 +7,14 @@ use std::collections::BinaryHeap;
 use crate::mesh::{TriMesh, VertexId};
 
 /// For each vertex the index of the nearest of `nodes`; `u32::MAX` where none can be reached.
-pub(in crate::embed) fn cells(mesh: &TriMesh, nodes: &[VertexId]) -> Vec<u32> {
+pub(super) fn nearest_nodes(mesh: &TriMesh, nodes: &[VertexId]) -> Vec<u32> {
     let mut distance = vec![f64::INFINITY; mesh.n_vertices()];
     let mut cell = vec![u32::MAX; mesh.n_vertices()];
     let mut queue = BinaryHeap::new();
     for (i, v) in nodes.iter().enumerate() {
         distance[v.index()] = 0.0;
         cell[v.index()] = i as u32;
-        // Distances are not negative, so their bits order as they do.
+        // Non-negative numbers compare like their bits, which are totally ordered.
         queue.push(Reverse((0u64, *v)));
     }
     while let Some(Reverse((bits, v))) = queue.pop() {

@@ -1,75 +1,90 @@
-//! Putting a node somewhere on the surface (Campen, section 6.5.1).
+//! Relocation of nodes on the surface (Campen, section 6.5.1).
 //!
-//! A node must be a vertex, but its place is continuous: one of the corners of the triangle it comes to lie in is put
-//! there, the one that has to move least, and goes back where it was once the node leaves it. Nothing is inserted and
-//! no connection changes. The place is always a point of the surface itself.
+//! A node must be a vertex, but its position is continuous. So a corner of the triangle that the position lies in is
+//! moved there, the one that moves least, and returns to its rest position once the node leaves it. No vertex is
+//! inserted and no connectivity changes. Positions are projected onto the surface of the problem; a position is
+//! refused, and the step halved, where triangles around it would flip or degenerate.
 
 use std::collections::{HashMap, VecDeque};
 
 use glam::{DVec2, DVec3};
 
-use crate::embed::optimise::regular_nodes::Crossing;
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::surface::Metric;
-use crate::surface::{SurfaceIndex, trace_geodesic};
+use crate::surface::{Metric, SurfaceIndex, trace_geodesic};
 
-/// How often a step that is not possible is halved before the node stays.
+/// Halvings of a step that is not possible before the node stays. Chosen by hand.
 const HALVINGS: usize = 4;
-/// Doubled area over squared longest side below which triangles around a node may not become thinner than by half: the
-/// map's gradients there mean little.
-const THIN: f64 = 0.02;
-/// Least cosine between normals of triangles before and after.
-const TILT: f64 = 0.2;
+/// Ratio of a triangle's doubled area to its squared longest side, 0 to √3/2. A triangle must stay above this bound, or
+/// above half its own ratio where it is thinner already: initial embeddings leave slivers along arcs, and a node beside
+/// one must be able to move. Gradients of the map in thinner triangles mean little.
+const MIN_THICKNESS: f64 = 0.02;
+/// Least cosine between the normals of a triangle before and after; 1 would forbid any tilt, 0 allows a right angle.
+const MIN_NORMAL_COSINE: f64 = 0.2;
 
-/// What holds a node.
+/// The freedom of a node to move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NodeConstraint {
-    /// Nothing: it moves freely on the surface.
+    /// It moves freely on the surface.
     Free,
-    /// It slides along a feature or the boundary.
+    /// It moves along a feature or the boundary.
     Curve,
-    /// It stays.
+    /// It does not move.
     Fixed,
 }
 
-/// Where nodes may go.
-pub(in crate::embed) struct SurfaceProjection<'a> {
-    /// The surface.
+/// The surface with what restricts the positions of nodes on it.
+pub(super) struct SurfaceProjection<'a> {
+    /// The mesh of the problem.
     pub surface: &'a TriMesh,
-    /// Its points by nearness.
+    /// Its spatial index.
     pub index: &'a SurfaceIndex,
-    /// Where every vertex is when no node is there.
-    pub home: Vec<DVec3>,
+    /// The position of each vertex of the working mesh while no node is there.
+    pub rest_position: Vec<DVec3>,
     /// Whether each edge of the working mesh is sharp or on the boundary.
     pub curve: Vec<bool>,
-    /// Whether each vertex is on such an edge.
+    /// Whether each vertex of the working mesh is on such an edge.
     pub on_curve: Vec<bool>,
-    /// What holds each node.
-    pub hold: Vec<NodeConstraint>,
-    /// How close irregular nodes may come to each other.
-    pub apart: f64,
+    /// The freedom of each node.
+    pub node_constraint: Vec<NodeConstraint>,
+    /// Least distance between irregular nodes.
+    pub min_distance: f64,
+}
+
+/// The point where two isolines cross.
+pub(super) struct CrossingPoint {
+    /// The triangle it lies in.
+    pub face: FaceId,
+    /// Its barycentric coordinates there.
+    pub weights: [f64; 3],
+    /// Its position in space.
+    pub position: DVec3,
+    /// Adjacent triangles from there back to the node.
+    pub strip: Vec<FaceId>,
 }
 
 impl SurfaceProjection<'_> {
-    /// Moves a free node in polar direction and length `step`; returns how far it got.
-    pub(in crate::embed) fn glide(
+    /// Moves a free node along a straightest geodesic, given by the vector `step` of its polar map; returns the length
+    /// moved.
+    pub(super) fn move_free(
         &self,
-        net: &mut EmbeddingTopology,
+        topology: &mut EmbeddingTopology,
         metric: &Metric,
         node: usize,
         step: DVec2,
         cell: &[u32],
     ) -> f64 {
-        let v = net.nodes[node].vertex;
+        let v = topology.nodes[node].vertex;
         let mut length = step.length();
         for _ in 0..=HALVINGS {
-            let trace = trace_geodesic(&net.mesh, metric, v, step.to_angle().rem_euclid(std::f64::consts::TAU), length);
-            let own = net.mesh.face_vertices(trace.end.face).iter().any(|w| cell[w.index()] == node as u32);
-            let place = self.index.nearest(trace.end.position(&net.mesh)).position(self.surface);
-            if !trace.hit_boundary && own && self.keeps_apart(net, node, place) {
-                let strip = strip(&net.mesh, trace.first, &trace.crossed);
-                if self.settle(net, node, place, trace.end.face, &strip) {
+            let direction = step.to_angle().rem_euclid(std::f64::consts::TAU);
+            let trace = trace_geodesic(&topology.mesh, metric, v, direction, length);
+            let own = topology.mesh.face_vertices(trace.end.face).iter().any(|w| cell[w.index()] == node as u32);
+            let position = self.index.nearest(trace.end.position(&topology.mesh)).position(self.surface);
+            // A node stays in its cell, so that simultaneous steps of neighbours do not collide (section 6.6.2).
+            if !trace.hit_boundary && own && self.keeps_distance(topology, node, position) {
+                let strip = strip(&topology.mesh, trace.first, &trace.crossed);
+                if self.put_in_face(topology, node, position, trace.end.face, &strip) {
                     return length;
                 }
             }
@@ -78,172 +93,174 @@ impl SurfaceProjection<'_> {
         0.0
     }
 
-    /// Whether a node at `place` is far enough from the others, or at least no closer than it was. Irregular nodes that
-    /// come close together circle each other and wind up their arcs.
-    fn keeps_apart(&self, net: &EmbeddingTopology, node: usize, place: DVec3) -> bool {
-        let old = net.mesh.position(net.nodes[node].vertex);
-        net.nodes[node].is_regular()
-            || net.nodes.iter().enumerate().filter(|&(i, n)| i != node && !n.is_regular()).all(|(_, n)| {
-                let other = net.mesh.position(n.vertex);
-                let (before, after) = (other.distance(old), other.distance(place));
-                after > before || after > self.apart
+    /// Whether a node at `position` keeps the least distance from other irregular nodes, or at least comes no closer.
+    /// Irregular nodes close together circle each other and wind up their arcs.
+    fn keeps_distance(&self, topology: &EmbeddingTopology, node: usize, position: DVec3) -> bool {
+        let old = topology.mesh.position(topology.nodes[node].vertex);
+        topology.nodes[node].is_regular()
+            || topology.nodes.iter().enumerate().filter(|&(i, n)| i != node && !n.is_regular()).all(|(_, n)| {
+                let other = topology.mesh.position(n.vertex);
+                let (before, after) = (other.distance(old), other.distance(position));
+                after > before || after > self.min_distance
             })
     }
 
-    /// Puts the node at `place` in `face`, by one of its corners; nothing changes if none will do.
-    fn settle(&self, net: &mut EmbeddingTopology, node: usize, place: DVec3, face: FaceId, strip: &[FaceId]) -> bool {
-        let from = net.nodes[node].vertex;
-        let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
-        let mut corners: Vec<VertexId> = net.mesh.face_vertices(face).to_vec();
-        // A triangle with nodes at two corners has little choice in the map, one with three none at all.
-        let beside = |v: VertexId| net.mesh.outgoing(v).any(|h| taken.contains(&net.mesh.target(h)));
+    /// Puts the node at `position` in `face` by one of its corners. Returns whether that is possible; if not, nothing
+    /// changes.
+    fn put_in_face(
+        &self,
+        topology: &mut EmbeddingTopology,
+        node: usize,
+        position: DVec3,
+        face: FaceId,
+        strip: &[FaceId],
+    ) -> bool {
+        let from = topology.nodes[node].vertex;
+        let taken: Vec<VertexId> = topology.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
+        let mut corners: Vec<VertexId> = topology.mesh.face_vertices(face).to_vec();
+        // Nodes must not share triangles: one with nodes at two corners is nearly determined in the map, one with three
+        // entirely.
+        let beside = |v: VertexId| topology.mesh.outgoing(v).any(|h| taken.contains(&topology.mesh.target(h)));
         corners.retain(|&v| v == from || !(taken.contains(&v) || self.on_curve[v.index()] || beside(v)));
-        corners.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
+        self.sort_by_rest_distance(&mut corners, position);
         for to in corners {
-            let path = edge_path(&net.mesh, strip, from, to, |v| taken.contains(&v));
-            if path.is_some_and(|path| self.bring(net, node, (&path, to), place)) {
+            let path = edge_path(&topology.mesh, strip, from, to, |v| taken.contains(&v));
+            if path.is_some_and(|path| self.move_to_vertex(topology, node, (&path, to), position)) {
                 return true;
             }
         }
         false
     }
 
-    /// The net with a node put at a crossing by one of the corners of its triangle, those first that have to move least; on
-    /// a feature that is `held` by an end of that edge.
-    pub(in crate::embed) fn put_at<'n>(
+    /// The topologies with a node put at a crossing by one of the corners of its triangle, in order of how far the
+    /// corner moves. A crossing on an edge for which `is_feature` holds is put there by an end of that edge.
+    pub(super) fn put_at<'n>(
         &'n self,
-        net: &'n EmbeddingTopology,
+        topology: &'n EmbeddingTopology,
         node: usize,
-        at: &'n Crossing,
-        held: impl Fn(HalfedgeId) -> bool,
+        at: &'n CrossingPoint,
+        is_feature: impl Fn(HalfedgeId) -> bool,
     ) -> impl Iterator<Item = EmbeddingTopology> + 'n {
-        let from = net.nodes[node].vertex;
-        let sides = net.mesh.face_halfedges(at.face);
-        let place = self.index.nearest(at.place).position(self.surface);
-        let taken: Vec<VertexId> = net.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
-        let on = (0..3).find(|&k| at.weights[(k + 2) % 3] == 0.0 && held(sides[k])).map(|k| sides[k]);
+        let from = topology.nodes[node].vertex;
+        let sides = topology.mesh.face_halfedges(at.face);
+        let position = self.index.nearest(at.position).position(self.surface);
+        let taken: Vec<VertexId> = topology.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
+        let on = (0..3).find(|&k| at.weights[(k + 2) % 3] == 0.0 && is_feature(sides[k])).map(|k| sides[k]);
         let allowed = |v: VertexId| match on {
-            Some(h) => (v == net.mesh.origin(h) || v == net.mesh.target(h)) && self.along(&net.mesh, v).len() == 2,
-            None => !net.mesh.outgoing(v).any(&held) && !net.mesh.is_boundary_vertex(v),
+            Some(h) => {
+                (v == topology.mesh.origin(h) || v == topology.mesh.target(h))
+                    && self.curve_edges(&topology.mesh, v).len() == 2
+            }
+            None => !topology.mesh.outgoing(v).any(&is_feature) && !topology.mesh.is_boundary_vertex(v),
         };
-        let mut list = net.mesh.face_vertices(at.face).to_vec();
+        let mut list = topology.mesh.face_vertices(at.face).to_vec();
         list.retain(|v| allowed(*v) && !taken.contains(v));
-        list.sort_by(|a, b| self.home[a.index()].distance(place).total_cmp(&self.home[b.index()].distance(place)));
+        self.sort_by_rest_distance(&mut list, position);
         list.into_iter().filter_map(move |to| {
-            let path = edge_path(&net.mesh, &at.strip, from, to, |v| taken.contains(&v))?;
-            let mut moved = net.clone();
-            self.bring(&mut moved, node, (&path, to), place).then_some(moved)
+            let path = edge_path(&topology.mesh, &at.strip, from, to, |v| taken.contains(&v))?;
+            let mut moved = topology.clone();
+            self.move_to_vertex(&mut moved, node, (&path, to), position).then_some(moved)
         })
     }
 
-    /// Brings a node along edges to a vertex that is put at `place`; nothing changes if triangles would suffer.
-    fn bring(
+    /// Sorts vertices by the distance of their rest positions to `position`.
+    fn sort_by_rest_distance(&self, vertices: &mut [VertexId], position: DVec3) {
+        let distance = |v: &VertexId| self.rest_position[v.index()].distance(position);
+        vertices.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    }
+
+    /// Moves a node along a path of edges to the vertex `to`, which is put at `position`. Returns whether the triangles
+    /// around allow that; if not, nothing changes.
+    fn move_to_vertex(
         &self,
-        net: &mut EmbeddingTopology,
+        topology: &mut EmbeddingTopology,
         node: usize,
         (path, to): (&[HalfedgeId], VertexId),
-        place: DVec3,
+        position: DVec3,
     ) -> bool {
-        let from = net.nodes[node].vertex;
-        let old = net.mesh.position(from);
-        let before = self.at_rest(&net.mesh, from, to);
-        net.mesh.set_position(from, self.home[from.index()]);
-        net.mesh.set_position(to, place);
-        if sound(&net.mesh, &before) {
-            path.iter().for_each(|&h| net.move_node(node, h));
+        let from = topology.nodes[node].vertex;
+        let old = topology.mesh.position(from);
+        let before = self.triangles_at_rest(&topology.mesh, from, to);
+        topology.mesh.set_position(from, self.rest_position[from.index()]);
+        topology.mesh.set_position(to, position);
+        if are_sound(&topology.mesh, &before) {
+            path.iter().for_each(|&h| topology.move_node(node, h));
             return true;
         }
-        net.mesh.set_position(to, self.home[to.index()]);
-        net.mesh.set_position(from, old);
+        topology.mesh.set_position(to, self.rest_position[to.index()]);
+        topology.mesh.set_position(from, old);
         false
     }
 
-    /// The triangles around two vertices as they are when no node is there.
-    fn at_rest(&self, mesh: &TriMesh, a: VertexId, b: VertexId) -> Vec<AtRest> {
+    /// The triangles around two vertices at rest.
+    fn triangles_at_rest(&self, mesh: &TriMesh, a: VertexId, b: VertexId) -> Vec<TriangleAtRest> {
         let mut faces: Vec<FaceId> = [a, b].iter().flat_map(|&v| mesh.outgoing(v).map(|h| mesh.face(h))).collect();
         faces.sort_unstable();
         faces.dedup();
-        let at = |v: VertexId| if v == a || v == b { self.home[v.index()] } else { mesh.position(v) };
+        let at = |v: VertexId| if v == a || v == b { self.rest_position[v.index()] } else { mesh.position(v) };
         faces
             .into_iter()
             .map(|f| {
-                let (area, longest) = spread(mesh.face_vertices(f).map(at));
-                AtRest { face: f, normal: area.normalize_or_zero(), width: area.length() / longest }
+                let (area, longest) = area_and_longest(mesh.face_vertices(f).map(at));
+                TriangleAtRest { face: f, normal: area.normalize_or_zero(), thickness: area.length() / longest }
             })
             .collect()
     }
 
-    /// Slides a node along its curve by `length`, the way that agrees most with `direction`; returns how far it got.
-    pub(in crate::embed) fn slide(
+    /// Moves a node along its curve by `length`, in the sense that agrees most with `direction`; returns the length
+    /// moved. It stops half an edge before a corner or another node.
+    pub(super) fn move_along_curve(
         &self,
-        net: &mut EmbeddingTopology,
+        topology: &mut EmbeddingTopology,
         node: usize,
         direction: DVec3,
         length: f64,
     ) -> f64 {
         let mut left = length;
-        let mut at = net.mesh.position(net.nodes[node].vertex);
-        let mut v = net.nodes[node].vertex;
+        let mut at = topology.mesh.position(topology.nodes[node].vertex);
+        let mut v = topology.nodes[node].vertex;
         let mut path: Vec<HalfedgeId> = Vec::new();
         let mut last: Option<VertexId> = None;
         let mut heading = direction;
         loop {
-            let ends = self.along(&net.mesh, v);
+            let ends = self.curve_edges(&topology.mesh, v);
             let onward = ends.into_iter().filter(|&(_, w)| Some(w) != last).max_by(|a, b| {
-                let cosine = |w: VertexId| (self.home[w.index()] - at).normalize_or_zero().dot(heading);
+                let cosine = |w: VertexId| (self.rest_position[w.index()] - at).normalize_or_zero().dot(heading);
                 cosine(a.1).total_cmp(&cosine(b.1))
             });
             let Some((h, w)) = onward else { break };
-            let goal = self.home[w.index()];
+            let goal = self.rest_position[w.index()];
             let stretch = goal.distance(at);
-            let taken = net.nodes.iter().any(|n| n.vertex == w);
-            let corner = self.along(&net.mesh, w).len() != 2;
+            let taken = topology.nodes.iter().any(|n| n.vertex == w);
+            let corner = self.curve_edges(&topology.mesh, w).len() != 2;
             if left <= stretch || taken || corner {
-                // Between `v` and `w`: whichever is nearer by its own place takes the node, if it may.
+                // The position lies between `v` and `w`: the node goes to the nearer one that it may have.
                 let most = if taken || corner { 0.5 * stretch } else { stretch };
-                let place = at + (goal - at).normalize_or_zero() * left.min(most);
+                let position = at + (goal - at).normalize_or_zero() * left.min(most);
                 let free = !(taken || corner);
-                let nearer = self.home[w.index()].distance(place) < self.home[v.index()].distance(place);
+                let nearer =
+                    self.rest_position[w.index()].distance(position) < self.rest_position[v.index()].distance(position);
                 if free && nearer {
                     path.push(h);
                 }
-                return self.put(net, node, &path, place, length - left + left.min(most));
+                let to = if free && nearer { w } else { v };
+                let moved = self.move_to_vertex(topology, node, (&path, to), position);
+                return if moved { length - left + left.min(most) } else { 0.0 };
             }
             path.push(h);
             left -= stretch;
             heading = (goal - at).normalize_or_zero();
             at = goal;
             (last, v) = (Some(v), w);
-            if path.len() > net.mesh.n_edges() {
+            if path.len() > topology.mesh.n_edges() {
                 break;
             }
         }
         0.0
     }
 
-    fn put(&self, net: &mut EmbeddingTopology, node: usize, path: &[HalfedgeId], place: DVec3, moved: f64) -> f64 {
-        let from = net.nodes[node].vertex;
-        let mut to = from;
-        for &h in path {
-            to = if net.mesh.origin(h) == to { net.mesh.target(h) } else { net.mesh.origin(h) };
-        }
-        let old = net.mesh.position(from);
-        let before = self.at_rest(&net.mesh, from, to);
-        net.mesh.set_position(from, self.home[from.index()]);
-        net.mesh.set_position(to, place);
-        if sound(&net.mesh, &before) {
-            for &h in path {
-                net.move_node(node, h);
-            }
-            return moved;
-        }
-        net.mesh.set_position(to, self.home[to.index()]);
-        net.mesh.set_position(from, old);
-        0.0
-    }
-
     /// The curve edges at a vertex: a half-edge of each (leaving `v` where there is one) and the other end.
-    fn along(&self, mesh: &TriMesh, v: VertexId) -> Vec<(HalfedgeId, VertexId)> {
+    fn curve_edges(&self, mesh: &TriMesh, v: VertexId) -> Vec<(HalfedgeId, VertexId)> {
         let mut ends: Vec<_> =
             mesh.outgoing(v).filter(|&h| self.curve[mesh.edge(h).index()]).map(|h| (h, mesh.target(h))).collect();
         if mesh.is_boundary_vertex(v) {
@@ -254,14 +271,14 @@ impl SurfaceProjection<'_> {
     }
 }
 
-/// The triangles from `first` across `crossed`.
+/// The triangles from `first` across the half-edges `crossed`.
 fn strip(mesh: &TriMesh, first: FaceId, crossed: &[HalfedgeId]) -> Vec<FaceId> {
     let mut faces = vec![first];
     faces.extend(crossed.iter().filter_map(|&h| mesh.twin(h)).map(|t| mesh.face(t)));
     faces
 }
 
-/// A path of half-edges within a strip of triangles that avoids vertices that are `taken` and the boundary.
+/// A shortest path of edges within a strip of triangles that avoids the boundary and vertices that are `taken`.
 pub(in crate::embed) fn edge_path(
     mesh: &TriMesh,
     strip: &[FaceId],
@@ -304,26 +321,26 @@ pub(in crate::embed) fn edge_path(
     Some(path)
 }
 
-/// A triangle when no node is at its corners.
-struct AtRest {
+/// A triangle with its corners at their rest positions.
+struct TriangleAtRest {
     face: FaceId,
     normal: DVec3,
-    /// Its doubled area over the square of its longest side.
-    width: f64,
+    /// Its doubled area over its squared longest side.
+    thickness: f64,
 }
 
-/// Whether triangles are neither turned over nor squashed against what they were.
-fn sound(mesh: &TriMesh, before: &[AtRest]) -> bool {
-    before.iter().all(|&AtRest { face, normal, width }| {
-        let (area, longest) = spread(mesh.face_vertices(face).map(|v| mesh.position(v)));
-        let upright = area.dot(normal) > TILT * area.length();
-        // A triangle that was degenerate before says nothing.
-        normal == DVec3::ZERO || (upright && area.length() > THIN.min(0.5 * width) * longest)
+/// Whether no triangle is flipped or much thinner than at rest.
+fn are_sound(mesh: &TriMesh, before: &[TriangleAtRest]) -> bool {
+    before.iter().all(|&TriangleAtRest { face, normal, thickness }| {
+        let (area, longest) = area_and_longest(mesh.face_vertices(face).map(|v| mesh.position(v)));
+        let upright = area.dot(normal) > MIN_NORMAL_COSINE * area.length();
+        // A triangle that is degenerate at rest has no normal to compare with.
+        normal == DVec3::ZERO || (upright && area.length() > MIN_THICKNESS.min(0.5 * thickness) * longest)
     })
 }
 
-/// The normal of a triangle, as long as its doubled area, and the square of its longest side.
-fn spread([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
+/// The normal of a triangle, with its doubled area for length, and its squared longest side.
+fn area_and_longest([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
     let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
     ((b - a).cross(c - a), longest)
 }

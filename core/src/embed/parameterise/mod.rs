@@ -1,11 +1,14 @@
-//! Cross field and seamless map for nodes at given vertices: linear solves, their constraints, and how good the map is.
+//! Cross field and seamless map for nodes at given vertices: the solves, their constraints, quality measures, and the
+//! gradient of the energy at the nodes.
 //!
-//! The room may use `topology`; it does not move nodes.
+//! The room may use `topology`; it does not move nodes. [`solve`] is the entry.
 
-pub(in crate::embed) mod chord_lengths;
-pub(in crate::embed) mod constraints;
-pub(in crate::embed) mod feature_axes;
-pub(in crate::embed) mod node_gradient;
-pub(in crate::embed) mod quality;
-pub(in crate::embed) mod solve;
-pub(in crate::embed) mod state;
+pub(super) mod chord_lengths;
+pub(super) mod constraints;
+pub(super) mod feature_axes;
+pub(super) mod injective;
+pub(super) mod node_gradient;
+pub(super) mod quality;
+pub(super) mod solve;
+pub(super) mod state;
+pub(super) mod stiffen;

@@ -1,94 +1,95 @@
-//! How good an embedded layout is, by the three measures of Campen, section 6.8.1.
+//! Quality measures of maps (Campen, section 6.8.1).
 //!
 //! With the gradients of u and v on each triangle, the singular values `σ₁ ≥ σ₂` of the map from surface to plane,
-//! the surface's second fundamental form II and principal curvatures κ, and the area A of the surface `M`:
+//! the second fundamental form II, principal curvatures κ, and the area A of the surface `M`:
 //!
-//! * conformal `1/A ∫ σ₁/σ₂ + σ₂/σ₁`: 2 where angles are kept, more where squares become rectangles or rhombi;
-//! * planar `1/√A ∫ |II(∇u/‖∇u‖, ∇v/‖∇v‖)|`: how far quads along the isolines are from flat; the absolute value
-//!   is taken, or bends of opposite sign would cancel;
-//! * alignment: the mean angle of ∇u and ∇v to the nearest principal direction, weighted by `(κ₁ − κ₂)²`, in
-//!   degrees: 22.5 for directions at random, 45 at most.
+//! * conformal distortion `E_confor = 1/A ∫ σ₁/σ₂ + σ₂/σ₁`: 2 where angles are preserved, larger where squares become
+//!   rectangles or rhombi;
+//! * conjugacy error `E_planar = 1/√A ∫ |II(∇u/‖∇u‖, ∇v/‖∇v‖)|`: 0 if small quads along the isolines are planar. The
+//!   absolute value is taken, which the thesis does not write: values of opposite sign would cancel;
+//! * alignment error `E°`: the mean angle of ∇u and ∇v to the nearest principal direction, weighted by `(κ₁ − κ₂)²`, in
+//!   degrees: 22.5 for random directions, 45 at most.
 //!
-//! All three do not depend on the size of the surface or of the map.
+//! All three are independent of the scale of the surface and of the map.
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
 use crate::layout::PatchMap;
-use crate::mesh::TriMesh;
+use crate::mesh::{FaceId, TriMesh};
 use crate::param::SeamlessMap;
 use crate::surface::PrincipalCurvature;
 use crate::surface::second_fundamental_form;
 
-/// Largest conformal distortion of one triangle. Collapsed triangles would make any mean infinite; at 100, squares
-/// become rectangles of 1 to 100, the map is useless there and the triangle still counts by its area only.
-const WORST: f64 = 100.0;
+/// Bound of the conformal distortion of one triangle: degenerate triangles would make the mean infinite. At 100, where
+/// a square becomes a rectangle of 1 to 100, the map is useless anyway.
+const MAX_CONFORMAL: f64 = 100.0;
 
 /// The measures of a map of a whole surface. Integrals are over the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Measures {
-    /// Mean conformal distortion, 2 at best.
+    /// Mean conformal distortion, at least 2.
     pub conformal: f64,
-    /// Conjugacy error, 0 at best.
+    /// Conjugacy error, at least 0.
     pub planar: f64,
-    /// Mean deviation from principal directions, in degrees; 0 where nothing is curved.
+    /// Alignment error in degrees, 0 to 45; 0 if curvature is the same in all directions everywhere.
     pub alignment: f64,
-    /// Largest conformal distortion of a triangle, 100 at most.
-    pub worst: f64,
-    /// Number of triangles the map turns over or flattens.
+    /// Largest conformal distortion of a triangle, at most 100.
+    pub max_conformal: f64,
+    /// Number of flipped or degenerate triangles.
     pub flipped: usize,
-    /// Number of triangles whose distortion is cut off at 100.
-    pub capped: usize,
+    /// Number of triangles whose conformal distortion is clamped to 100.
+    pub clamped: usize,
 }
 
 /// The measures of one patch.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PatchMeasures {
-    /// Longer over shorter side of the rectangle.
+    /// Ratio of the longer to the shorter side of the rectangle.
     pub aspect: f64,
     /// Area on the surface.
     pub area: f64,
-    /// The measures of this patch alone; its conjugacy error is relative to its own area.
+    /// The measures of this patch alone; `A` is its own area.
     pub measures: Measures,
 }
 
-/// What a map does to one triangle.
+/// The measures of one triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleMeasure {
     /// Area on the surface.
     pub area: f64,
     /// Conformal distortion, 2 to 100.
     pub conformal: f64,
-    /// Mean deviation of ∇u and ∇v from the nearest principal direction, in degrees, 0 to 45.
+    /// Mean angle of ∇u and ∇v to the nearest principal direction, in degrees, 0 to 45.
     pub deviation: f64,
     /// `II(∇u/‖∇u‖, ∇v/‖∇v‖)`, in inverse lengths.
     pub torsion: f64,
-    /// `(κ₁ − κ₂)²`.
+    /// `(κ₁ − κ₂)²`, in inverse squared lengths.
     pub anisotropy: f64,
-    /// Whether the triangle is turned over or flattened.
+    /// Whether the image is flipped or has no area.
     pub flipped: bool,
 }
 
-/// The measures of a seamless map, and those of each triangle; `bending` as from
-/// [`face_curvature`](crate::surface::face_curvature).
+/// The measures of a seamless map, and those of each triangle. `curvature` holds principal curvatures of the triangles,
+/// as from [`face_curvature`](crate::surface::face_curvature).
 pub fn measure_map(
     mesh: &TriMesh,
     map: &SeamlessMap,
-    bending: &[PrincipalCurvature],
+    curvature: &[PrincipalCurvature],
 ) -> (Measures, Vec<TriangleMeasure>) {
     let corners = |f| mesh.face_vertices(f).map(|v| mesh.position(v));
-    let triangle = |f: crate::mesh::FaceId| measure(corners(f), map.uv[f.index()], &bending[f.index()]);
+    let triangle = |f: FaceId| measure(corners(f), map.uv[f.index()], &curvature[f.index()]);
     let triangles: Vec<TriangleMeasure> = mesh.faces().map(triangle).collect();
     (summary(&triangles), triangles)
 }
 
 /// The measures of patches that together are a surface, those of each patch, and those of each triangle of each
-/// patch; `bending` for the triangles of the original mesh.
+/// patch. `curvature` holds principal curvatures of the triangles of the original mesh.
 pub fn measure_patches(
     patches: &[PatchMap],
-    bending: &[PrincipalCurvature],
+    curvature: &[PrincipalCurvature],
 ) -> (Measures, Vec<PatchMeasures>, Vec<Vec<TriangleMeasure>>) {
-    let triangles: Vec<Vec<TriangleMeasure>> = patches.iter().map(|p| patch_triangles(p, bending)).collect();
+    let triangles: Vec<Vec<TriangleMeasure>> = patches.iter().map(|p| patch_triangles(p, curvature)).collect();
     let each = patches.iter().zip(&triangles).map(|(patch, triangles)| PatchMeasures {
         aspect: patch.size.max_element() / patch.size.min_element(),
         area: triangles.iter().map(|t| t.area).sum(),
@@ -97,17 +98,17 @@ pub fn measure_patches(
     (summary(triangles.iter().flatten()), each.collect(), triangles)
 }
 
-fn patch_triangles(patch: &PatchMap, bending: &[PrincipalCurvature]) -> Vec<TriangleMeasure> {
-    let triangle = |f: crate::mesh::FaceId| {
+fn patch_triangles(patch: &PatchMap, curvature: &[PrincipalCurvature]) -> Vec<TriangleMeasure> {
+    let triangle = |f: FaceId| {
         let v = patch.mesh.face_vertices(f);
         let base = patch.base_face[f.index()] as usize;
-        measure(v.map(|v| patch.mesh.position(v)), v.map(|v| patch.uv[v.index()]), &bending[base])
+        measure(v.map(|v| patch.mesh.position(v)), v.map(|v| patch.uv[v.index()]), &curvature[base])
     };
     patch.mesh.faces().map(triangle).collect()
 }
 
-/// What the map from `points` to `uv` does to a triangle.
-fn measure(points: [DVec3; 3], uv: [DVec2; 3], bending: &PrincipalCurvature) -> TriangleMeasure {
+/// The measures of the triangle `points` mapped to `uv`.
+fn measure(points: [DVec3; 3], uv: [DVec2; 3], curvature: &PrincipalCurvature) -> TriangleMeasure {
     let [a, b, c] = points;
     let twice = (b - a).cross(c - a);
     let normal = twice.normalize_or_zero();
@@ -118,20 +119,21 @@ fn measure(points: [DVec3; 3], uv: [DVec2; 3], bending: &PrincipalCurvature) -> 
     let [p, q] = [du, dv].map(|d| d.normalize_or_zero());
     TriangleMeasure {
         area: 0.5 * twice.length(),
-        conformal: if conformal.is_finite() { conformal.clamp(2.0, WORST) } else { WORST },
-        deviation: 0.5 * (deviation(p, bending) + deviation(q, bending)),
-        torsion: second_fundamental_form(bending, p, q),
-        anisotropy: (bending.k_max - bending.k_min).powi(2),
+        conformal: if conformal.is_finite() { conformal.clamp(2.0, MAX_CONFORMAL) } else { MAX_CONFORMAL },
+        deviation: 0.5 * (deviation(p, curvature) + deviation(q, curvature)),
+        torsion: second_fundamental_form(curvature, p, q),
+        anisotropy: (curvature.k_max - curvature.k_min).powi(2),
         flipped: (uv[1] - uv[0]).perp_dot(uv[2] - uv[0]) <= 0.0,
     }
 }
 
-/// The angle of a tangent direction to the nearest of both principal directions, in degrees.
-fn deviation(d: DVec3, bending: &PrincipalCurvature) -> f64 {
-    let (x, y) = (d.dot(bending.d_min).abs(), d.dot(bending.d_max).abs());
+/// The angle of a tangent direction to the nearest principal direction, in degrees.
+fn deviation(d: DVec3, curvature: &PrincipalCurvature) -> f64 {
+    let (x, y) = (d.dot(curvature.d_min).abs(), d.dot(curvature.d_max).abs());
     x.min(y).atan2(x.max(y)).to_degrees()
 }
 
+/// Area-weighted means, maxima and counts of the measures of triangles.
 fn summary<'a>(triangles: impl IntoIterator<Item = &'a TriangleMeasure>) -> Measures {
     let mut total = Measures::default();
     let (mut area, mut weight) = (0.0, 0.0);
@@ -141,9 +143,9 @@ fn summary<'a>(triangles: impl IntoIterator<Item = &'a TriangleMeasure>) -> Meas
         total.conformal += t.area * t.conformal;
         total.planar += t.area * t.torsion.abs();
         total.alignment += t.area * t.anisotropy * t.deviation;
-        total.worst = total.worst.max(t.conformal);
+        total.max_conformal = total.max_conformal.max(t.conformal);
         total.flipped += usize::from(t.flipped);
-        total.capped += usize::from(t.conformal == WORST);
+        total.clamped += usize::from(t.conformal == MAX_CONFORMAL);
     }
     let over = |sum: f64, whole: f64| if whole > 0.0 { sum / whole } else { 0.0 };
     total.conformal = over(total.conformal, area);
@@ -182,22 +184,22 @@ mod tests {
     }
 
     #[test]
-    fn conformal_distortion_knows_similarities_and_stretch() {
+    fn conformal_distortion_of_similarities_and_stretches() {
         let mesh = square(5);
         let flat = vec![FLAT; mesh.n_faces()];
         let of = |map: &dyn Fn(DVec3) -> DVec2| measure_map(&mesh, &seamless(&mesh, map), &flat).0;
         let same = of(&|p| p.truncate());
         assert!((same.conformal - 2.0).abs() < 1e-12 && (same.planar, same.alignment, same.flipped) == (0.0, 0.0, 0));
         let turned = of(&|p| DVec2::from_angle(0.7).rotate(p.truncate()) * 30.0 + DVec2::ONE);
-        assert!((turned.conformal - 2.0).abs() < 1e-12 && turned.worst < 2.0 + 1e-9);
+        assert!((turned.conformal - 2.0).abs() < 1e-12 && turned.max_conformal < 2.0 + 1e-9);
         for a in [0.2, 3.0] {
             let m = of(&|p| DVec2::new(a * p.x, p.y));
-            assert!((m.conformal - (a + 1.0 / a)).abs() < 1e-9 && (m.worst - m.conformal).abs() < 1e-9);
+            assert!((m.conformal - (a + 1.0 / a)).abs() < 1e-9 && (m.max_conformal - m.conformal).abs() < 1e-9);
         }
         let mirrored = of(&|p| DVec2::new(-p.x, p.y));
-        assert_eq!((mirrored.flipped, mirrored.capped), (50, 0));
+        assert_eq!((mirrored.flipped, mirrored.clamped), (50, 0));
         let collapsed = of(&|_| DVec2::ZERO);
-        assert_eq!((collapsed.flipped, collapsed.capped, collapsed.worst), (50, 50, WORST));
+        assert_eq!((collapsed.flipped, collapsed.clamped, collapsed.max_conformal), (50, 50, MAX_CONFORMAL));
     }
 
     /// A cylinder of radius 0.2 and height 1 with a map turned by `turn` from its lines of curvature.
@@ -219,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn alignment_and_conjugacy_on_a_cylinder() {
+    fn alignment_and_conjugacy_error_on_a_cylinder() {
         let along = cylinder(0.0, 1.0);
         assert!((along.conformal - 2.0).abs() < 1e-9 && along.alignment < 1e-6 && along.planar < 1e-9, "{along:?}");
         // II = κ/2 half way between the lines of curvature; the area is the height times the circumference.
@@ -235,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn random_directions_deviate_by_an_eighth_of_a_right_angle_twice() {
+    fn random_directions_have_an_alignment_error_of_22_5_degrees() {
         let mut state = 1u64;
         let mut random = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -254,13 +256,13 @@ mod tests {
     }
 
     #[test]
-    fn a_torus_along_its_circles() {
+    fn measures_of_a_torus_mapped_along_its_circles() {
         let (n, m) = (96, 48);
         let mesh = torus(n, m);
         let curvature = principal_curvature(&mesh, 0.02, &vec![false; mesh.n_edges()]);
-        let bending = face_curvature(&mesh, &curvature, |_| true);
+        let of_faces = face_curvature(&mesh, &curvature, |_| true);
         let map = grid_map(&mesh, n, m, |p| p * DVec2::new(0.3 * TAU, 0.1 * TAU));
-        let (measures, triangles) = measure_map(&mesh, &map, &bending);
+        let (measures, triangles) = measure_map(&mesh, &map, &of_faces);
         // Cells are trapezoids, not rectangles; a turn by an eighth would give a planar measure of about 5.
         assert!(measures.alignment < 1.0 && measures.planar < 0.25 && measures.flipped == 0, "{measures:?}");
         // The stretch around the axis is r / 0.3 with r = 0.3 + 0.1 cos b; the area element goes with r.
@@ -276,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_are_measured_like_the_whole() {
+    fn measures_of_patches_agree_with_those_of_the_surface() {
         let mesh = square(4);
         let patch = PatchMap {
             whole: (0..25).collect(),

@@ -1,109 +1,102 @@
-//! Field and map for nodes at certain places, and what can be read from them.
+//! Field and map for nodes at given vertices, and what can be read from them.
 
 use glam::DVec2;
+use serde::Serialize;
 
-use crate::embed::problem::{FeatureEdges, Snapshot};
-use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
-use crate::embed::trace::arcs::{ArcChain, preview_arcs};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::field::CrossField;
 use crate::mesh::{EdgeId, VertexId};
 use crate::param::{DistortionWeights, InjectiveEnergy, Objective, Residual, Solution, residuals};
 use crate::surface::Metric;
 
-/// Field and map for nodes at certain places.
+/// Field and map for nodes at given vertices.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// The net: mesh, nodes, arcs.
-    pub net: EmbeddingTopology,
-    /// The planar layouts of the mesh's triangles.
+    /// The topology of the embedding: working mesh, nodes, arcs.
+    pub topology: EmbeddingTopology,
+    /// Metric of the working mesh: each triangle in a plane.
     pub metric: Metric,
     /// The guiding field.
     pub field: CrossField,
-    /// What the map minimises.
+    /// Target lengths and norm of the least-squares energy.
     pub objective: Objective,
-    /// For each triangle the factor by which the anisotropy counts in a map without folds.
+    /// For each triangle the share of the anisotropy that counts there in an injective map; see
+    /// [`DistortionWeights::with_anisotropy_share`].
     pub anisotropy_share: Vec<f64>,
     /// The map and its energy.
     pub solution: Solution,
 }
 
-/// Share of the wanted area below which an image is as good as flat.
+/// Sharp edges inside the surface, counted on the working mesh, which may be finer than the mesh of the problem.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FeatureEdges {
+    /// Number of sharp edges.
+    pub total: usize,
+    /// Number of those on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which
+    /// the surface's bounding-box diagonal is 1.
+    pub on_isolines: usize,
+    /// The end points of the others.
+    pub off_isolines: Vec<[[f64; 3]; 2]>,
+}
+
+/// Ratio of an image's area to its target area at and below which the triangle counts as flipped: so thin it is flat
+/// but for rounding. Chosen by hand.
 const FLAT: f64 = 1e-3;
-/// Coordinates that differ by no more are the same.
-const SAME: f64 = 1e-9;
+/// Coordinates that differ by no more count as equal: rounding on a surface of bounding-box diagonal 1.
+const EQUAL: f64 = 1e-9;
 
 impl State {
-    /// Number of triangles that the map turns over, or by more than a right angle away from the field.
+    /// Number of flipped triangles; see [`Self::flipped_triangles`].
     pub fn flipped(&self) -> usize {
-        self.folded().iter().filter(|&&f| f).count()
+        self.flipped_triangles().iter().filter(|&&f| f).count()
     }
 
-    /// For each triangle whether the map turns it over, or by more than a right angle away from the field.
-    pub(in crate::embed) fn folded(&self) -> Vec<bool> {
+    /// For each triangle whether the map flips it or turns it by more than a right angle away from the field. The
+    /// latter counts because a node of eight quarters can be mapped onto four without any triangle of negative area.
+    pub(in crate::embed) fn flipped_triangles(&self) -> Vec<bool> {
         let errors = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
         let lengths = |f: usize| self.objective.lengths.get(f).copied().unwrap_or([1.0; 2]);
-        let folded = |(f, r): (usize, &Residual)| {
+        let flipped = |(f, r): (usize, &Residual)| {
             let [a, b] = lengths(f);
             let (u, v) = (r.u + DVec2::new(a, 0.0), r.v + DVec2::new(0.0, b));
             u.perp_dot(v) <= FLAT * a * b || u.x / a + v.y / b <= 0.0
         };
-        errors.iter().enumerate().map(folded).collect()
+        errors.iter().enumerate().map(flipped).collect()
     }
 
-    /// The energy of least squares of the map.
+    /// The least-squares energy of the map (equation 6.1), whatever energy it minimises.
     pub(in crate::embed) fn least_squares(&self) -> f64 {
         let each = residuals(&self.metric, &self.field.angle, &self.solution.map.uv, &self.objective);
         each.iter().map(|r| r.energy).sum()
     }
 
-    /// The energy of each triangle of the map: that of maps without folds of a shape, or that of least squares.
-    pub(in crate::embed) fn energies(&self, shape: Option<DistortionWeights>) -> Vec<f64> {
+    /// The energy of each triangle: that of injective maps with the given weights, or without weights that of least
+    /// squares.
+    pub(in crate::embed) fn energies(&self, distortion: Option<DistortionWeights>) -> Vec<f64> {
         let Self { metric, field, objective, anisotropy_share, solution, .. } = self;
-        match shape {
-            Some(shape) => InjectiveEnergy::new(metric, &field.angle, objective, (shape, anisotropy_share))
+        match distortion {
+            Some(distortion) => InjectiveEnergy::new(metric, &field.angle, objective, (distortion, anisotropy_share))
                 .of_each(&solution.map.uv),
             None => residuals(metric, &field.angle, &solution.map.uv, objective).iter().map(|r| r.energy).collect(),
         }
     }
 
-    /// Which of the edges that are `sharp` lie on isolines.
-    pub(in crate::embed) fn features(&self, sharp: &[bool]) -> FeatureEdges {
-        let (mesh, uv) = (&self.net.mesh, &self.solution.map.uv);
+    /// Which of the `sharp` edges lie on isolines.
+    pub(in crate::embed) fn feature_edges(&self, sharp: &[bool]) -> FeatureEdges {
+        let (mesh, uv) = (&self.topology.mesh, &self.solution.map.uv);
         let inner: Vec<EdgeId> = mesh.edges().filter(|&e| sharp[e.index()] && !mesh.is_boundary_edge(e)).collect();
         let is_off = |&e: &EdgeId| {
             let h = mesh.halfedge(e).index();
             let [p, q] = [h % 3, (h + 1) % 3].map(|k| uv[h / 3][k]);
-            (p - q).abs().min_element() > SAME
+            (p - q).abs().min_element() > EQUAL
         };
         let ends = |e: EdgeId| mesh.edge_vertices(e).map(|v| mesh.position(v).to_array());
         let off: Vec<_> = inner.iter().copied().filter(is_off).map(ends).collect();
-        FeatureEdges { all: inner.len(), on_isolines: inner.len() - off.len(), off }
+        FeatureEdges { total: inner.len(), on_isolines: inner.len() - off.len(), off_isolines: off }
     }
 
-    pub(in crate::embed) fn chains(&self) -> Vec<ArcChain<'_>> {
-        let chain = |a: &'_ TopologyArc| (a.start, a.end, a.heading);
-        self.net
-            .arcs
-            .iter()
-            .map(|a| {
-                let (start, end, heading) = chain(a);
-                ArcChain { start, crossed: &a.crossed, end, heading }
-            })
-            .collect()
-    }
-
+    /// The vertices of the nodes.
     pub(in crate::embed) fn vertices(&self) -> Vec<VertexId> {
-        self.net.nodes.iter().map(|n| n.vertex).collect()
-    }
-
-    pub(in crate::embed) fn snapshot(&self, step: usize, first: f64) -> Snapshot {
-        let vertices = self.vertices();
-        Snapshot {
-            step,
-            energy: if first > 0.0 { self.solution.energy / first } else { 1.0 },
-            flipped: self.flipped(),
-            arcs: preview_arcs(&self.net.mesh, &self.solution.map, &vertices, &self.chains()),
-            nodes: vertices.iter().map(|&v| self.net.mesh.position(v)).collect(),
-        }
+        self.topology.nodes.iter().map(|n| n.vertex).collect()
     }
 }

@@ -1,138 +1,116 @@
-//! Which chords of a layout are collapsed (Campen, section 6.9).
+//! The choice of chords to collapse (Campen, section 6.9).
 //!
-//! Arcs that want to be shorter than a least length pull the nodes at their ends together: their chord is deleted, and
-//! these become one. Shortest chords come first; of chords that meet in a node only one at a time, since the next map has
-//! other lengths there. A collapse that makes the map much worse is taken back.
+//! Collapsing a chord merges the end nodes of each of its arcs. The thesis constrains its length to zero; here the
+//! chord is deleted from the layout. Shortest chords come first. Of chords that meet in a node only one is collapsed at
+//! a time, since lengths in the next map differ there. A collapse that is undone because of its energy is not tried
+//! again.
 
-use serde::Serialize;
-
+use crate::embed::pipeline::report::{CollapsedChord, UncollapsedChord};
 use crate::embed::problem::Problem;
 use crate::layout::{CollapseError, CollapsedLayout, QuadLayout, Reembedded, ReembeddingError, redraw};
 use crate::progress::Progress;
 
-/// A chord that was collapsed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CollapsedChord {
-    /// Its number in the layout that was given.
-    pub chord: u32,
-    /// The length of its arcs in the last map that had it.
-    pub length: f64,
-    /// How many patches it ran through.
-    pub patches: usize,
-}
-
-/// A chord that is short and stays.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct UncollapsedChord {
-    /// Its number in the layout that was given.
-    pub chord: u32,
-    /// The length of its arcs.
-    pub length: f64,
-    /// Why it could not be collapsed.
-    pub reason: String,
-}
-
-/// The chords of a layout that are collapsed, and those that are to be and cannot.
+/// The chords of a layout that are collapsed, and those that cannot be.
 #[derive(Debug, Clone)]
-pub(in crate::embed) struct Collapse<'a> {
+pub(super) struct ChordCollapse<'a> {
     layout: &'a QuadLayout,
-    /// Nodes that stay where they are: no two of them may become one.
-    stays: Vec<bool>,
-    /// Whether each chord is gone.
-    pub gone: Vec<bool>,
-    /// Whether each chord was tried in vain.
+    /// Whether each node cannot move: no two of these may be merged.
+    fixed_nodes: Vec<bool>,
+    /// Whether each chord is collapsed.
+    deleted: Vec<bool>,
+    /// Whether the collapse of each chord was undone.
     refused: Vec<bool>,
-    /// Those that are, in order.
-    pub done: Vec<CollapsedChord>,
-    /// Those that cannot be.
-    pub kept: Vec<UncollapsedChord>,
+    /// The collapsed chords, in order.
+    pub collapsed: Vec<CollapsedChord>,
+    /// The chords that were to be collapsed and remain.
+    pub uncollapsed: Vec<UncollapsedChord>,
 }
 
-impl<'a> Collapse<'a> {
-    pub(in crate::embed) fn new(layout: &'a QuadLayout, stays: Vec<bool>) -> Self {
+impl<'a> ChordCollapse<'a> {
+    /// No chord collapsed.
+    pub(super) fn new(layout: &'a QuadLayout, fixed_nodes: Vec<bool>) -> Self {
         let none = vec![false; layout.chords];
-        Self { layout, stays, gone: none.clone(), refused: none, done: Vec::new(), kept: Vec::new() }
+        let (collapsed, uncollapsed) = (Vec::new(), Vec::new());
+        Self { layout, fixed_nodes, deleted: none.clone(), refused: none, collapsed, uncollapsed }
     }
 
-    /// Notes which of these short chords, given by number and length, are to be collapsed now, at most so many, and if
-    /// so asked only those that make the layout less irregular; returns how many.
-    pub(in crate::embed) fn choose(&mut self, mut short: Vec<(u32, f64)>, most: usize, simpler: bool) -> usize {
-        short.retain(|&(chord, _)| !self.gone[chord as usize] && !self.refused[chord as usize]);
+    /// Collapses at most `most` of the chords `short`, given by index and length; with `only_simpler` only those
+    /// without which the layout is less irregular. Returns the number of chords collapsed.
+    pub(super) fn choose(&mut self, mut short: Vec<(u32, f64)>, most: usize, only_simpler: bool) -> usize {
+        short.retain(|&(chord, _)| !self.deleted[chord as usize] && !self.refused[chord as usize]);
         short.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        let before = self.done.len();
-        let mut irregularity = self.attempt().map_or(usize::MAX, |c| c.layout.irregularity());
+        let before = self.collapsed.len();
+        let mut irregularity = self.remaining_layout().map_or(usize::MAX, |c| c.layout.irregularity());
+        // Nodes merged in this call.
         let mut touched = vec![false; self.layout.nodes.len()];
         for (chord, length) in short {
-            if self.done.len() == before + most {
+            if self.collapsed.len() == before + most {
                 break;
             }
             let ends = || self.layout.arcs.iter().filter(move |a| a.chord == chord).flat_map(|a| a.nodes);
             if ends().any(|n| touched[n as usize]) {
                 continue;
             }
-            self.gone[chord as usize] = true;
-            match self.attempt() {
-                Ok(collapsed) if simpler && collapsed.layout.irregularity() >= irregularity => {
-                    self.gone[chord as usize] = false;
+            self.deleted[chord as usize] = true;
+            match self.remaining_layout() {
+                Ok(remaining) if only_simpler && remaining.layout.irregularity() >= irregularity => {
+                    self.deleted[chord as usize] = false;
                 }
-                Ok(collapsed) => {
-                    irregularity = collapsed.layout.irregularity();
+                Ok(remaining) => {
+                    irregularity = remaining.layout.irregularity();
                     let mut merged = vec![false; self.layout.nodes.len()];
-                    ends().for_each(|n| merged[collapsed.nodes[n as usize] as usize] = true);
-                    for (t, &now) in touched.iter_mut().zip(&collapsed.nodes) {
+                    ends().for_each(|n| merged[remaining.nodes[n as usize] as usize] = true);
+                    for (t, &now) in touched.iter_mut().zip(&remaining.nodes) {
                         *t |= merged[now as usize];
                     }
-                    self.done.push(CollapsedChord { chord, length, patches: self.patches(chord) });
+                    self.collapsed.push(CollapsedChord { chord, length, patches: self.patches_of(chord) });
                 }
                 Err(reason) => {
-                    self.gone[chord as usize] = false;
-                    self.keep(chord, length, reason);
+                    self.deleted[chord as usize] = false;
+                    self.note_uncollapsed(chord, length, reason);
                 }
             }
         }
-        self.done.len() - before
+        self.collapsed.len() - before
     }
 
-    /// Takes back the choices after the first `count`; for a `reason` they are not made again.
-    pub(in crate::embed) fn take_back(&mut self, count: usize, reason: Option<&str>) {
-        for c in self.done.split_off(count) {
-            self.gone[c.chord as usize] = false;
+    /// Undoes all collapses after the first `count`. If a `reason` is given, these chords are not tried again.
+    pub(super) fn undo(&mut self, count: usize, reason: Option<&str>) {
+        for c in self.collapsed.split_off(count) {
+            self.deleted[c.chord as usize] = false;
             if let Some(reason) = reason {
                 self.refused[c.chord as usize] = true;
-                self.keep(c.chord, c.length, reason.to_owned());
+                self.note_uncollapsed(c.chord, c.length, reason.to_owned());
             }
         }
     }
 
-    fn keep(&mut self, chord: u32, length: f64, reason: String) {
-        self.kept.retain(|k| k.chord != chord);
-        self.kept.push(UncollapsedChord { chord, length, reason });
+    fn note_uncollapsed(&mut self, chord: u32, length: f64, reason: String) {
+        self.uncollapsed.retain(|k| k.chord != chord);
+        self.uncollapsed.push(UncollapsedChord { chord, length, reason });
     }
 
-    /// What is left, unless the chords cannot be deleted.
-    fn attempt(&self) -> Result<CollapsedLayout, String> {
-        let collapsed = self.layout.without(&self.gone).map_err(|e: CollapseError| e.to_string())?;
-        let mut taken: Vec<Option<usize>> = vec![None; collapsed.layout.nodes.len()];
-        for n in (0..self.stays.len()).filter(|&n| self.stays[n]) {
-            if let Some(other) = taken[collapsed.nodes[n] as usize].replace(n) {
-                return Err(format!("nodes {other} and {n} stay where they are"));
+    /// The layout without the collapsed chords, or why these cannot be deleted.
+    fn remaining_layout(&self) -> Result<CollapsedLayout, String> {
+        let remaining = self.layout.without(&self.deleted).map_err(|e: CollapseError| e.to_string())?;
+        let mut taken: Vec<Option<usize>> = vec![None; remaining.layout.nodes.len()];
+        for n in (0..self.fixed_nodes.len()).filter(|&n| self.fixed_nodes[n]) {
+            if let Some(other) = taken[remaining.nodes[n] as usize].replace(n) {
+                return Err(format!("nodes {other} and {n} cannot move"));
             }
         }
-        Ok(collapsed)
+        Ok(remaining)
     }
 
-    /// What is left, drawn.
-    pub(in crate::embed) fn draw(
-        &self,
-        job: &Problem<'_>,
-        progress: &Progress,
-    ) -> Result<Reembedded, ReembeddingError> {
-        let n_surface = job.surface.mesh.n_vertices();
-        redraw(job.layout, job.initial_embedding, &self.gone, |n| self.stays[n], n_surface, progress)
+    /// The remaining layout with an initial embedding.
+    pub(super) fn reembed(&self, problem: &Problem<'_>, progress: &Progress) -> Result<Reembedded, ReembeddingError> {
+        let Problem { surface, layout, initial_embedding, .. } = *problem;
+        let fixed = |n: usize| self.fixed_nodes[n];
+        redraw(layout, initial_embedding, &self.deleted, fixed, surface.mesh.n_vertices(), progress)
     }
 
     /// Number of patches that a chord runs through.
-    fn patches(&self, chord: u32) -> usize {
+    fn patches_of(&self, chord: u32) -> usize {
         let through = |sides: &[(u32, bool); 4]| sides.iter().any(|s| self.layout.arcs[s.0 as usize].chord == chord);
         self.layout.patches.iter().filter(|p| through(&p.sides)).count()
     }

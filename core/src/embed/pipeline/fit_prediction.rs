@@ -1,66 +1,70 @@
-//! How well a layout will fit a surface, told before it is embedded.
+//! Prediction of how well a layout will fit a surface, before it is embedded.
 //!
-//! Where the nodes are drawn, the guiding field with the layout's singularities and the map of least squares along it are
-//! linear solves. What is measured of finished embeddings is measured of this map, as if what folds were squeezed. It is
-//! not the same, but close to it in rank: enough to choose between many layouts, a hundred times as fast. Some steps of the
-//! nodes bring it closer, and show which folds do not go away.
+//! For nodes at their initial positions, the guiding field and the least-squares map take linear solves only. The
+//! quality measures of this map are not those of the finished embedding, but nearly in the same order, which suffices
+//! to choose between many layouts, a hundred times as fast. Some node steps bring them closer and show which flipped
+//! triangles persist.
 
-use crate::embed::EmbeddingError;
+use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
+use crate::embed::optimise::setup::PreparedTopology;
 use crate::embed::parameterise::quality::{TriangleMeasure, measure_map};
-use crate::embed::parameterise::solve::{Aim, Features};
+use crate::embed::parameterise::solve::{FeatureConstraint, MapKind};
 use crate::embed::parameterise::state::State;
 use crate::embed::problem::Problem;
 use crate::progress::Progress;
 use crate::surface::face_curvature;
 
-/// The most that the distortion of a triangle counts, and that of one that folds: few triangles of embeddings have more.
-const WORST: f64 = 4.0;
+/// Bound of the conformal distortion of one triangle, and the value of a flipped one, which an injective map will
+/// squeeze. Few triangles of finished embeddings have more.
+const MAX_CONFORMAL: f64 = 4.0;
 
-/// What is foreseen of an embedding.
+/// The predicted quality of an embedding.
 #[derive(Debug, Clone)]
 pub struct PredictedFit {
-    /// The mean deviation of the map from principal directions, in degrees, as
+    /// Alignment error of the least-squares map in degrees, as
     /// [`Measures::alignment`](crate::embed::Measures::alignment).
     pub alignment: f64,
-    /// Its conformal distortion, as [`Measures::conformal`](crate::embed::Measures::conformal), but of no triangle more than it
-    /// can be made: what folds here will be squeezed.
+    /// Its conformal distortion, as [`Measures::conformal`](crate::embed::Measures::conformal), but with a smaller
+    /// bound for each triangle.
     pub conformal: f64,
-    /// The share of triangles that are folded: what does not go away when nodes move can hardly be unfolded.
-    pub folded: f64,
-    /// What each triangle of the surface adds to the deviation.
+    /// The share of triangles that are flipped, 0 to 1. Those that persist while nodes move can hardly be removed.
+    pub flipped: f64,
+    /// The contribution of each triangle of the surface to the alignment error, in degrees.
     pub shares: Vec<f64>,
 }
 
-/// Foresees how well a layout will fit the surface, with the nodes moved so many times.
+/// Predicts how well a layout will fit the surface, after the given number of node steps.
 ///
 /// # Errors
 ///
 /// See [`EmbeddingError`].
-pub fn predict_fit(job: &Problem<'_>, steps: usize, progress: &Progress) -> Result<PredictedFit, EmbeddingError> {
-    let ready = Optimiser::net(job)?;
+pub fn predict_fit(problem: &Problem<'_>, steps: usize, progress: &Progress) -> Result<PredictedFit, EmbeddingError> {
+    let prepared = PreparedTopology::new(problem)?;
     progress.check()?;
-    let mut optimiser = Optimiser::on(job, ready, (Aim::LeastSquares, Features::Pulled(1.0)), progress)?
-        .map_err(|_| EmbeddingError::Folded)?;
+    // Least squares ignore penalties: features do not constrain the map.
+    let kind = (MapKind::LeastSquares, FeatureConstraint::Penalty(1.0));
+    let mut optimiser =
+        Optimiser::with_map(problem, prepared, kind, progress)?.map_err(|_| EmbeddingError::NoInjectiveMap)?;
     for _ in 0..steps {
         progress.check()?;
         optimiser.step(progress)?;
     }
-    let State { net, solution, .. } = optimiser.state();
-    let mesh = &net.mesh;
-    let bending = face_curvature(mesh, &optimiser.curvature, |_| true);
-    let (_, triangles) = measure_map(mesh, &solution.map, &bending);
+    let State { topology, solution, .. } = optimiser.state();
+    let mesh = &topology.mesh;
+    let curvature = face_curvature(mesh, &optimiser.curvature, |_| true);
+    let (_, triangles) = measure_map(mesh, &solution.map, &curvature);
     let area: f64 = triangles.iter().map(|t| t.area).sum();
     let weight: f64 = triangles.iter().map(|t| t.area * t.anisotropy).sum();
     let (area, weight) = (area.max(f64::MIN_POSITIVE), weight.max(f64::MIN_POSITIVE));
-    let distortion = |t: &TriangleMeasure| if t.flipped { WORST } else { t.conformal.min(WORST) };
+    let distortion = |t: &TriangleMeasure| if t.flipped { MAX_CONFORMAL } else { t.conformal.min(MAX_CONFORMAL) };
     let conformal = triangles.iter().map(|t| t.area * distortion(t)).sum::<f64>() / area;
-    let mut shares = vec![0.0; job.surface.mesh.n_faces()];
-    for (t, base) in triangles.iter().zip(&net.base_face) {
+    let mut shares = vec![0.0; problem.surface.mesh.n_faces()];
+    for (t, base) in triangles.iter().zip(&topology.base_face) {
         shares[base.index()] += t.area * t.anisotropy * t.deviation / weight;
     }
-    let folded = optimiser.state().flipped() as f64 / mesh.n_faces() as f64;
-    Ok(PredictedFit { alignment: shares.iter().sum(), conformal, folded, shares })
+    let flipped = optimiser.state().flipped() as f64 / mesh.n_faces() as f64;
+    Ok(PredictedFit { alignment: shares.iter().sum(), conformal, flipped, shares })
 }
 
 #[cfg(test)]
@@ -74,8 +78,8 @@ mod tests {
 
     const N: u32 = 24;
 
-    /// What is foreseen of the layout of some curves on a torus.
-    fn of(curves: &[SurfaceCurve], steps: usize) -> PredictedFit {
+    /// The predicted fit of the layout dual to some curves on a torus.
+    fn predicted(curves: &[SurfaceCurve], steps: usize) -> PredictedFit {
         let mesh = torus(N, N);
         let arrangement = Arrangement::new(&mesh, curves).unwrap();
         let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
@@ -84,7 +88,7 @@ mod tests {
         let sharp = vec![false; mesh.n_edges()];
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
         let index = SurfaceIndex::new(&mesh);
-        let job = Problem {
+        let problem = Problem {
             surface: Surface { mesh: &mesh, index: &index, curvature: &curvature, sharp: &sharp },
             layout: &layout,
             initial_embedding: &initial_embedding,
@@ -93,26 +97,27 @@ mod tests {
             pinned_arcs: &[],
             settings: Settings::default(),
         };
-        let found = predict_fit(&job, steps, &Progress::new()).unwrap();
+        let found = predict_fit(&problem, steps, &Progress::new()).unwrap();
         assert_eq!(found.shares.len(), mesh.n_faces());
         assert!((found.shares.iter().sum::<f64>() - found.alignment).abs() < 1e-12);
         found
     }
 
     #[test]
-    fn circles_suit_a_torus_and_windings_do_not() {
-        let along = of(&[row(N, 3, true, 0.4), column(N, N, 5, true, 0.4)], 0);
+    fn circles_along_a_torus_fit_better_than_windings() {
+        let along = predicted(&[row(N, 3, true, 0.4), column(N, N, 5, true, 0.4)], 0);
         assert!(along.alignment < 2.5 && along.conformal < 2.02, "{} {}", along.alignment, along.conformal);
-        let wound = of(&[diagonal(N), column(N, N, 5, true, 0.4)], 0);
+        let wound = predicted(&[diagonal(N), column(N, N, 5, true, 0.4)], 0);
         assert!(wound.conformal > along.conformal + 0.3, "{} {}", wound.conformal, along.conformal);
     }
 
     #[test]
-    fn what_is_foreseen_becomes_no_worse_when_nodes_move() {
+    fn node_steps_do_not_worsen_the_predicted_fit() {
         let curves =
             [row(N, 3, true, 0.4), row(N, 5, true, 0.4), column(N, N, 5, true, 0.4), column(N, N, 6, true, 0.4)];
-        let [drawn, moved] = [0, 3].map(|steps| of(&curves, steps));
-        let price = |f: &PredictedFit| f.alignment + 10.0 * f.conformal;
-        assert!(price(&moved) <= price(&drawn) + 1e-2, "{} {}", price(&moved), price(&drawn));
+        let [initial, moved] = [0, 3].map(|steps| predicted(&curves, steps));
+        let objective = |f: &PredictedFit| f.alignment + 10.0 * f.conformal;
+        let (initial, moved) = (objective(&initial), objective(&moved));
+        assert!(moved <= initial + 1e-2, "{moved} {initial}");
     }
 }

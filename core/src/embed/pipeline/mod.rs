@@ -1,9 +1,13 @@
-//! An optimisation from the initial embedding to the result: its phases, by way of a smaller mesh where the mesh is large, with
-//! short chords collapsed where that is asked for; and the prediction of how well a layout will fit.
+//! An optimisation from the initial embedding to the result: its phases, by way of a smaller mesh where the mesh is
+//! large, with short chords collapsed where that is asked for; and the prediction of how well a layout will fit.
+//!
+//! [`coarse_to_fine`] is the entry. The room may use all other rooms of `embed`.
 
-pub(in crate::embed) mod chord_collapse;
-pub(in crate::embed) mod coarse_to_fine;
-pub(in crate::embed) mod fit_prediction;
-pub(in crate::embed) mod optimise;
-pub(in crate::embed) mod phases;
-pub(in crate::embed) mod reduced_problem;
+pub(super) mod chord_collapse;
+pub(super) mod coarse_to_fine;
+pub(super) mod extraction;
+pub(super) mod fit_prediction;
+pub(super) mod optimise;
+pub(super) mod phases;
+pub(super) mod reduced_problem;
+pub(super) mod report;

@@ -1,108 +1,139 @@
-//! Optimising the embedding of a layout, with chords collapsed where that is asked for.
+//! Optimisation on one mesh: the phases, and chord collapse where it is asked for (Campen, section 6.9).
+//!
+//! Short chords are collapsed after the least-squares descent: the layout without them is embedded and its nodes are
+//! moved anew. If the energy rises too much, or the remaining layout cannot be embedded, the collapse is undone.
 
-use crate::embed::EmbeddingError;
+use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
-use crate::embed::pipeline::chord_collapse::Collapse;
-use crate::embed::pipeline::coarse_to_fine::coarse_to_fine;
-use crate::embed::pipeline::phases::Course;
-use crate::embed::pipeline::reduced_problem::Shorter;
-use crate::embed::problem::{Next, OptimisedEmbedding, Problem, Settings, Snapshot};
+use crate::embed::pipeline::chord_collapse::ChordCollapse;
+use crate::embed::pipeline::phases::{Observer, Phases};
+use crate::embed::pipeline::reduced_problem::ReducedProblem;
+use crate::embed::pipeline::report::{Next, OptimisedEmbedding};
+use crate::embed::problem::{Problem, Settings};
 use crate::progress::Progress;
 
-/// From where to where moving nodes brings the progress of the whole.
-const MOVING: (f64, f64) = (0.05, 0.35);
-
-/// By what factor the energy may grow when arcs are collapsed that are shorter than was asked for.
-const WORSE: f64 = 1.5;
+/// Fractions of the whole optimisation at which the least-squares descent is reported to begin and end, 0 to 1.
+const DESCENT_FRACTIONS: (f64, f64) = (0.05, 0.35);
+/// Largest factor by which the energy may grow when chords below the asked length are collapsed: collapsing at any
+/// price can spoil a map. Chosen by hand.
+const ENERGY_GROWTH: f64 = 1.5;
 
 /// Which chords are collapsed.
 #[derive(Debug, Clone, Copy)]
-struct Rule {
-    /// Those shorter than this.
-    least: f64,
-    /// By what factor the energy may grow.
-    worse: f64,
-    /// How many at once.
-    most: usize,
-    /// Whether only those without which the layout is less irregular.
-    simpler: bool,
+struct CollapseRule {
+    /// Length in the map below which a chord is collapsed.
+    below: f64,
+    /// Largest factor by which the energy may grow.
+    energy_growth: f64,
+    /// Largest number of chords collapsed at once.
+    at_once: usize,
+    /// Whether only chords are collapsed without which the layout is less irregular.
+    only_simpler: bool,
 }
 
-/// Embeds a layout. `watch` is shown every step that made the embedding better and may ask to finish.
+/// Embeds a layout on the mesh of the problem. `observer` is shown every improvement and may ask to finish.
 ///
 /// # Errors
 ///
 /// See [`EmbeddingError`].
-pub fn optimise(
-    job: &Problem<'_>,
+pub(super) fn optimise_on_mesh(
+    problem: &Problem<'_>,
     progress: &Progress,
-    watch: &mut dyn FnMut(&Snapshot) -> Next,
+    observer: Observer<'_>,
 ) -> Result<OptimisedEmbedding, EmbeddingError> {
-    if let Some(done) = coarse_to_fine(job, progress, watch)? {
-        return Ok(done);
-    }
     progress.report("Embedding the layout", 0.0);
-    let (mut optimiser, mut course) = match Optimiser::new(job, progress) {
-        Ok(optimiser) => {
-            let course = Course::begin(job, &optimiser, watch);
-            (optimiser, course)
-        }
+    let mut optimiser = match Optimiser::new(problem, progress) {
+        Ok(optimiser) => optimiser,
+        // The injective phase from the initial embedding works on another mesh, cut along the arcs, and may succeed.
         Err(error) => {
-            let mut course = Course::new(job, watch);
-            let mut done = course.drawing_unfolded(job, Err(error), progress)?;
-            course.enter(&mut done.report);
+            let mut phases = Phases::new(problem, observer);
+            let mut done = phases.from_initial_embedding(problem, Err(error), progress)?;
+            phases.complete_report(&mut done.report);
             return Ok(done);
         }
     };
-    course.rest(&mut optimiser, MOVING, progress)?;
-    let Settings { collapse, simplify, .. } = job.settings;
-    if job.layout.patches.is_empty() || (collapse.is_none() && !simplify) {
-        return course.finish(job, optimiser, progress);
+    let mut phases = Phases::begin(problem, &optimiser, observer);
+    phases.move_nodes(&mut optimiser, DESCENT_FRACTIONS, progress)?;
+    let Settings { collapse, simplify, .. } = problem.settings;
+    if problem.layout.patches.is_empty() || (collapse.is_none() && !simplify) {
+        phases.finish(problem, optimiser, progress)
+    } else {
+        finish_with_collapse(problem, optimiser, phases, progress)
     }
-    let mut shorter = Shorter::none(job);
-    let mut chosen = Collapse::new(job.layout, optimiser.stays());
-    let one_by_one = Rule { least: f64::INFINITY, worse: 1.0, most: 1, simpler: true };
-    let shortest = collapse.map(|least| Rule { least, worse: WORSE, most: job.layout.chords, simpler: false });
-    for mut rule in shortest.into_iter().chain(simplify.then_some(one_by_one)) {
-        while course.next == Next::Continue {
-            let short = shorter.numbers(optimiser.short_chords(rule.least));
-            let before = chosen.done.len();
-            let count = chosen.choose(short, rule.most, rule.simpler);
+}
+
+/// Collapses chords as the settings ask for, then finishes the optimisation.
+fn finish_with_collapse(
+    problem: &Problem<'_>,
+    optimiser: Optimiser<'_>,
+    mut phases: Phases<'_>,
+    progress: &Progress,
+) -> Result<OptimisedEmbedding, EmbeddingError> {
+    let mut collapse = ChordCollapse::new(problem.layout, optimiser.fixed_nodes());
+    let mut reduced = ReducedProblem::unchanged(problem);
+    // Declared after the problem that later optimisers borrow.
+    let mut optimiser = optimiser;
+    for mut rule in collapse_rules(problem) {
+        while phases.next == Next::Continue {
+            let short = reduced.original_indices(optimiser.short_chords(rule.below));
+            let before = collapse.collapsed.len();
+            let count = collapse.choose(short, rule.at_once, rule.only_simpler);
             if count == 0 {
                 break;
             }
-            let most = rule.worse * optimiser.state().solution.energy;
-            let tried = chosen.draw(job, progress).map_err(|error| error.to_string());
+            let limit = rule.energy_growth * optimiser.state().solution.energy;
+            let tried = collapse.reembed(problem, progress).map_err(|error| error.to_string());
             progress.check()?;
-            let problem = match tried {
-                Ok(redrawn) => {
-                    shorter = Shorter::new(job, redrawn);
-                    optimiser = Optimiser::new(&shorter.job(job), progress)?;
-                    course.rest(&mut optimiser, MOVING, progress)?;
+            let failure = match tried {
+                Ok(reembedded) => {
+                    reduced = ReducedProblem::new(problem, reembedded);
+                    optimiser = moved_optimiser(&reduced.problem(problem), &mut phases, progress)?;
                     let energy = optimiser.state().solution.energy;
-                    tracing::debug!(gone = chosen.done.len(), energy, most, "chords collapsed");
-                    (energy > most)
-                        .then(|| format!("the energy would be {:.2} of what it is", rule.worse * energy / most))
+                    tracing::debug!(collapsed = collapse.collapsed.len(), energy, limit, "chords collapsed");
+                    (energy > limit).then(|| {
+                        format!("the energy would grow by a factor of {:.2}", rule.energy_growth * energy / limit)
+                    })
                 }
-                Err(problem) => Some(problem),
+                Err(failure) => Some(failure),
             };
-            if problem.is_some() {
-                // Of several only one may be to blame.
-                chosen.take_back(before, problem.as_deref().filter(|_| count == 1));
-                rule.most = 1;
-                shorter = match before {
-                    0 => Shorter::none(job),
-                    _ => Shorter::new(job, chosen.draw(job, progress)?),
+            if failure.is_some() {
+                // Of several chords only one may be to blame: none is excluded, and from now on they are tried one by
+                // one.
+                collapse.undo(before, failure.as_deref().filter(|_| count == 1));
+                rule.at_once = 1;
+                reduced = match before {
+                    0 => ReducedProblem::unchanged(problem),
+                    _ => ReducedProblem::new(problem, collapse.reembed(problem, progress)?),
                 };
-                optimiser = Optimiser::new(&shorter.job(job), progress)?;
-                course.rest(&mut optimiser, MOVING, progress)?;
+                optimiser = moved_optimiser(&reduced.problem(problem), &mut phases, progress)?;
             } else {
-                course.show(&optimiser);
+                phases.show(&optimiser);
             }
         }
     }
-    let mut done = course.finish(&shorter.job(job), optimiser, progress)?;
-    (done.report.collapsed, done.report.short) = (chosen.done, chosen.kept);
-    done.initial_embedding = shorter.redrawn.map(|r| r.embedding);
+    let mut done = phases.finish(&reduced.problem(problem), optimiser, progress)?;
+    (done.report.collapsed_chords, done.report.uncollapsed_chords) = (collapse.collapsed, collapse.uncollapsed);
+    done.initial_embedding = reduced.reembedded.map(|r| r.embedding);
     Ok(done)
+}
+
+/// The rules of the settings: first chords below the asked length, then chords one by one to simplify the layout.
+fn collapse_rules(problem: &Problem<'_>) -> impl Iterator<Item = CollapseRule> + use<> {
+    let Settings { collapse, simplify, .. } = problem.settings;
+    let at_once = problem.layout.chords;
+    let short =
+        collapse.map(|below| CollapseRule { below, energy_growth: ENERGY_GROWTH, at_once, only_simpler: false });
+    let simplifying = CollapseRule { below: f64::INFINITY, energy_growth: 1.0, at_once: 1, only_simpler: true };
+    short.into_iter().chain(simplify.then_some(simplifying))
+}
+
+/// A new optimiser after its least-squares descent.
+fn moved_optimiser<'a>(
+    problem: &Problem<'a>,
+    phases: &mut Phases<'_>,
+    progress: &Progress,
+) -> Result<Optimiser<'a>, EmbeddingError> {
+    let mut optimiser = Optimiser::new(problem, progress)?;
+    phases.move_nodes(&mut optimiser, DESCENT_FRACTIONS, progress)?;
+    Ok(optimiser)
 }

@@ -1,79 +1,80 @@
-//! The course of an optimisation: nodes move, folds go, arcs are traced and patches cut out.
+//! The phases of an optimisation on one mesh: least squares, then an injective map; in the end arcs and patches are
+//! extracted.
 //!
-//! Least squares come first: their steps are cheap and find where features can be held. What they end with, untangled if it
-//! folds, is where maps that never fold go on from; where it cannot be untangled these start from the drawing.
+//! The least-squares phase comes first: its steps are cheap, and it finds where features can be constrained. The
+//! injective phase starts from the least-squares map, with flipped triangles untangled; where that fails it starts from
+//! the initial embedding, and where that fails too the least-squares result is returned with its flipped triangles.
 
-use crate::embed::EmbeddingError;
-use crate::embed::map_rectangles;
+use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
-use crate::embed::parameterise::quality::measure_patches;
-use crate::embed::parameterise::solve::Folded;
-use crate::embed::parameterise::state::State;
-use crate::embed::problem::{EmbeddingReport, Next, OptimisedEmbedding, Problem, RemainingFlip, Settings, Snapshot};
-use crate::embed::trace::arcs::{FlippedTriangles, trace_arcs};
-use crate::embed::trace::completion::complete_layout;
-use crate::mesh::FaceId;
-use crate::param::{FlipReason, FlippedTriangle};
+use crate::embed::parameterise::injective::Flipped;
+use crate::embed::pipeline::extraction::extract_embedding;
+use crate::embed::pipeline::report::{EmbeddingReport, Next, OptimisedEmbedding, Snapshot};
+use crate::embed::problem::Problem;
 use crate::progress::Progress;
 
-/// How far the isolines that complete a partial layout are followed, in square roots of the surface's area: many times
-/// around anything, and yet an end.
-const LONGEST: f64 = 100.0;
+/// What is shown every improvement, and may ask to finish.
+pub(super) type Observer<'w> = &'w mut dyn FnMut(&Snapshot) -> Next;
 
-/// The course of an optimisation.
-pub(in crate::embed) struct Course<'w> {
-    watch: &'w mut dyn FnMut(&Snapshot) -> Next,
+/// An optimisation on its way through the phases.
+pub(super) struct Phases<'w> {
+    observer: Observer<'w>,
+    /// The last answer of the observer.
     pub next: Next,
+    /// Node steps of all phases.
     steps: usize,
     area: f64,
+    /// Energy over area, and flipped triangles, of the first map.
     energy_before: f64,
     flipped_before: usize,
-    /// The energy with which the present phase began.
-    first: Option<f64>,
+    /// The energy at the start of the present phase; `None` before its first state is shown.
+    phase_energy: Option<f64>,
 }
 
-impl<'w> Course<'w> {
-    pub(in crate::embed) fn new(job: &Problem<'_>, watch: &'w mut dyn FnMut(&Snapshot) -> Next) -> Self {
-        let area: f64 = job.surface.mesh.faces().map(|f| job.surface.mesh.face_area(f)).sum();
-        Self { watch, next: Next::Continue, steps: 0, area, energy_before: f64::NAN, flipped_before: 0, first: None }
+impl<'w> Phases<'w> {
+    /// Before the first map.
+    pub(super) fn new(problem: &Problem<'_>, observer: Observer<'w>) -> Self {
+        Self {
+            observer,
+            next: Next::Continue,
+            steps: 0,
+            area: problem.area(),
+            energy_before: f64::NAN,
+            flipped_before: 0,
+            phase_energy: None,
+        }
     }
 
-    pub(in crate::embed) fn begin(
-        job: &Problem<'_>,
-        optimiser: &Optimiser<'_>,
-        watch: &'w mut dyn FnMut(&Snapshot) -> Next,
-    ) -> Self {
-        let mut course = Self::new(job, watch);
-        course.energy_before = optimiser.state().solution.energy / course.area;
-        course.flipped_before = optimiser.state().flipped();
-        course.show(optimiser);
-        course
+    /// With the first map of an optimiser.
+    pub(super) fn begin(problem: &Problem<'_>, optimiser: &Optimiser<'_>, observer: Observer<'w>) -> Self {
+        let mut phases = Self::new(problem, observer);
+        phases.energy_before = optimiser.state().solution.energy / phases.area;
+        phases.flipped_before = optimiser.state().flipped();
+        phases.show(optimiser);
+        phases
     }
 
-    /// The course that goes on on another mesh.
-    pub(in crate::embed) fn going_on(
-        job: &Problem<'_>,
-        report: &EmbeddingReport,
-        watch: &'w mut dyn FnMut(&Snapshot) -> Next,
-    ) -> Self {
+    /// Continues on another mesh after an optimisation with the given report.
+    pub(super) fn continued(problem: &Problem<'_>, report: &EmbeddingReport, observer: Observer<'w>) -> Self {
         let EmbeddingReport { steps, energy_before, flipped_before, .. } = *report;
-        Self { steps, energy_before, flipped_before, ..Self::new(job, watch) }
+        Self { steps, energy_before, flipped_before, ..Self::new(problem, observer) }
     }
 
-    pub(in crate::embed) fn show(&mut self, optimiser: &Optimiser<'_>) {
+    /// Shows the state to the observer.
+    pub(super) fn show(&mut self, optimiser: &Optimiser<'_>) {
         let state = optimiser.state();
-        let first = *self.first.get_or_insert(state.solution.energy);
-        self.next = (self.watch)(&state.snapshot(self.steps, first));
+        let phase_energy = *self.phase_energy.get_or_insert(state.solution.energy);
+        self.next = (self.observer)(&Snapshot::new(state, self.steps, phase_energy));
     }
 
-    /// Moves the nodes until they rest, which is a part of the whole work.
-    pub(in crate::embed) fn rest(
+    /// Moves the nodes until the descent has ended. Progress is reported as going from `from` to `to`.
+    pub(super) fn move_nodes(
         &mut self,
         optimiser: &mut Optimiser<'_>,
         (from, to): (f64, f64),
         progress: &Progress,
     ) -> Result<(), EmbeddingError> {
-        while self.next == Next::Continue && !optimiser.is_done() && !optimiser.is_hopeless() {
+        while self.next == Next::Continue && !optimiser.is_done() && !optimiser.least_squares_failed() {
             progress.report("Moving nodes", from + (to - from) * optimiser.share_done());
             let better = optimiser.step(progress)?;
             self.steps += 1;
@@ -84,174 +85,124 @@ impl<'w> Course<'w> {
         Ok(())
     }
 
-    /// From nodes at rest to the finished embedding.
-    pub(in crate::embed) fn finish(
+    /// From the end of the least-squares descent to the final embedding.
+    pub(super) fn finish(
         mut self,
-        job: &Problem<'_>,
+        problem: &Problem<'_>,
         mut optimiser: Optimiser<'_>,
         progress: &Progress,
     ) -> Result<OptimisedEmbedding, EmbeddingError> {
-        let flipped_at_rest = optimiser.state().flipped();
-        let Settings { integer, .. } = job.settings;
-        let complete = !job.layout.patches.is_empty();
-        let found = if optimiser.is_hopeless() && complete && integer.is_none() {
-            Err(EmbeddingError::Folded)
+        let flipped_after_least_squares = optimiser.state().flipped();
+        let rounded = problem.settings.integer.is_some();
+        let complete = !problem.layout.patches.is_empty();
+        // A failed least-squares map is worth finalising only to complete a partial layout or to round lengths.
+        let found = if optimiser.least_squares_failed() && complete && !rounded {
+            Err(EmbeddingError::NoInjectiveMap)
         } else {
-            self.least_squares(job, &mut optimiser, progress)
+            self.finalise_least_squares(problem, &mut optimiser, progress)
         };
-        let is_whole = |done: &OptimisedEmbedding| done.report.folds.is_empty();
+        let has_no_flips = |done: &OptimisedEmbedding| done.report.remaining_flips.is_empty();
         let mut done = match found {
             Err(EmbeddingError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            // Nodes that move on would leave the grid.
-            Ok(done) if !complete || (integer.is_some() && is_whole(&done)) => done,
+            // The least-squares map completes a partial layout. With rounded lengths, nodes that move on would leave
+            // the grid.
+            Ok(done) if !complete || (rounded && has_no_flips(&done)) => done,
             found => {
-                let start = Optimiser::from_map(job, optimiser.into_parts(), progress);
-                match (self.without_folds(job, start, progress), found) {
+                let start = Optimiser::from_map_of(problem, optimiser, progress);
+                match (self.injective_phase(problem, start, progress), found) {
                     (Ok(done), _) => done,
                     (Err(EmbeddingError::Cancelled(cancelled)), _) => return Err(cancelled.into()),
-                    (Err(_), Ok(done)) if is_whole(&done) => done,
+                    (Err(_), Ok(done)) if has_no_flips(&done) => done,
                     (Err(error), found) => {
-                        tracing::debug!(%error, "no map without folds near that of least squares");
-                        self.drawing_unfolded(job, found, progress)?
+                        tracing::debug!(%error, "no injective map near that of least squares");
+                        self.from_initial_embedding(problem, found, progress)?
                     }
                 }
             }
         };
-        self.enter(&mut done.report);
-        done.report.flipped_at_rest = flipped_at_rest;
+        self.complete_report(&mut done.report);
+        done.report.flipped_after_least_squares = flipped_after_least_squares;
         Ok(done)
     }
 
-    /// The embedding that least squares lead to, with the folds that cannot be removed from it.
-    fn least_squares(
+    /// The embedding of the finalised least-squares map, with the flipped triangles that cannot be removed from it.
+    fn finalise_least_squares(
         &mut self,
-        job: &Problem<'_>,
+        problem: &Problem<'_>,
         optimiser: &mut Optimiser<'_>,
         progress: &Progress,
     ) -> Result<OptimisedEmbedding, EmbeddingError> {
-        if let Some(edge) = job.settings.integer {
+        if let Some(edge) = problem.settings.integer {
             progress.report("Rounding lengths", 0.35);
-            optimiser.round(edge, progress)?;
+            optimiser.round_chord_lengths(edge, progress)?;
             self.show(optimiser);
-            self.rest(optimiser, (0.35, 0.4), progress)?;
+            self.move_nodes(optimiser, (0.35, 0.4), progress)?;
         }
-        progress.report("Removing folds", 0.4);
-        let folds = optimiser.finish(progress)?;
-        finished(job, (optimiser.state(), &optimiser.sharp), &folds, self.area, progress)
+        progress.report("Removing flipped triangles", 0.4);
+        finalise(problem, optimiser, progress)
     }
 
-    /// The embedding without folds that the drawing leads to; if there is none, what was found before.
-    pub(in crate::embed) fn drawing_unfolded(
+    /// The result of the injective phase from the initial embedding; if it fails, `found` from before.
+    pub(super) fn from_initial_embedding(
         &mut self,
-        job: &Problem<'_>,
+        problem: &Problem<'_>,
         found: Result<OptimisedEmbedding, EmbeddingError>,
         progress: &Progress,
     ) -> Result<OptimisedEmbedding, EmbeddingError> {
-        let start = Optimiser::from_drawing(job, progress);
-        self.without_folds(job, start, progress).or_else(|error| match error {
+        let start = Optimiser::from_initial_embedding(problem, progress);
+        self.injective_phase(problem, start, progress).or_else(|error| match error {
             EmbeddingError::Cancelled(_) => Err(error),
             _ => found,
         })
     }
 
-    /// Enters into a report what happened on the way.
-    pub(in crate::embed) fn enter(&self, report: &mut EmbeddingReport) {
+    /// Adds steps, first energy and first flips to a report.
+    pub(super) fn complete_report(&self, report: &mut EmbeddingReport) {
         (report.steps, report.energy_before, report.flipped_before) =
             (self.steps, self.energy_before, self.flipped_before);
     }
 
-    /// Moves the nodes with a map that never folds.
-    pub(in crate::embed) fn without_folds(
+    /// Moves the nodes with an injective map. Regular nodes are released for that, since badly placed ones would stop
+    /// the descent early. Constraining them again in the end may fail; then the nodes move once more from the start of
+    /// the phase with all of them constrained, and if that fails too the start itself is the result.
+    pub(super) fn injective_phase(
         &mut self,
-        job: &Problem<'_>,
-        start: Result<Result<Optimiser<'_>, Folded>, EmbeddingError>,
+        problem: &Problem<'_>,
+        start: Result<Result<Optimiser<'_>, Flipped>, EmbeddingError>,
         progress: &Progress,
     ) -> Result<OptimisedEmbedding, EmbeddingError> {
-        let mut optimiser = start?.map_err(|_| EmbeddingError::Folded)?;
-        self.first = None;
+        let mut optimiser = start?.map_err(|_| EmbeddingError::NoInjectiveMap)?;
+        self.phase_energy = None;
         self.show(&optimiser);
-        let safe = optimiser.state().clone();
-        optimiser.release(job);
-        self.rest(&mut optimiser, (0.5, 0.8), progress)?;
+        let first = optimiser.state().clone();
+        optimiser.release_regular_nodes(problem);
+        self.move_nodes(&mut optimiser, (0.5, 0.8), progress)?;
         progress.report("Moving nodes", 0.8);
-        match self.held(job, &mut optimiser, progress) {
+        match finalise(problem, &mut optimiser, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
-                tracing::debug!(%error, "nodes that were released cannot be held: they move held");
-                optimiser.begin_held(safe.clone());
+                tracing::debug!(%error, "released nodes cannot be constrained: they move constrained");
+                optimiser.restart_constrained(first.clone());
                 self.show(&optimiser);
             }
             done => return done,
         }
-        self.rest(&mut optimiser, (0.8, 0.85), progress)?;
-        match self.held(job, &mut optimiser, progress) {
+        self.move_nodes(&mut optimiser, (0.8, 0.85), progress)?;
+        match finalise(problem, &mut optimiser, progress) {
             Err(error) if !matches!(error, EmbeddingError::Cancelled(_)) => {
-                tracing::debug!(%error, "nodes stay where they were");
-                finished(job, (&safe, &optimiser.sharp), &[], self.area, progress)
+                tracing::debug!(%error, "the first map of the phase is the result");
+                extract_embedding(problem, (&first, &optimiser.sharp), &[], progress)
             }
             done => done,
         }
     }
-
-    /// The embedding with all nodes held on their isolines.
-    fn held(
-        &self,
-        job: &Problem<'_>,
-        optimiser: &mut Optimiser<'_>,
-        progress: &Progress,
-    ) -> Result<OptimisedEmbedding, EmbeddingError> {
-        let folds = optimiser.finish(progress)?;
-        finished(job, (optimiser.state(), &optimiser.sharp), &folds, self.area, progress)
-    }
 }
 
-/// Arcs and patches of a map that is done. The report lacks what happened before.
-fn finished(
-    job: &Problem<'_>,
-    (state, sharp): (&State, &[bool]),
-    folds: &[FlippedTriangle],
-    area: f64,
+/// Ends the phase of an optimiser and extracts its embedding.
+fn finalise(
+    problem: &Problem<'_>,
+    optimiser: &mut Optimiser<'_>,
     progress: &Progress,
 ) -> Result<OptimisedEmbedding, EmbeddingError> {
-    progress.report("Tracing arcs", 0.9);
-    let strict = if folds.is_empty() { FlippedTriangles::Refuse } else { FlippedTriangles::Cross };
-    let (mesh, map) = (&state.net.mesh, &state.solution.map);
-    let (layout, traced) = if job.layout.patches.is_empty() {
-        let emerged = complete_layout(mesh, map, &state.vertices(), LONGEST * area.sqrt())?;
-        (emerged.layout, emerged.traced)
-    } else {
-        (job.layout.clone(), trace_arcs(mesh, map, job.layout, &state.vertices(), &state.chains(), strict)?)
-    };
-    progress.report("Cutting out patches", 0.95);
-    let mut maps = map_rectangles(&layout, &traced, progress)?;
-    let bending = crate::surface::face_curvature(job.surface.mesh, job.surface.curvature, |_| true);
-    let mut embedding = traced.embedding;
-    // Triangles of the working mesh lie in triangles of the surface.
-    let base = |f: &mut u32| *f = state.net.base_face[*f as usize].0;
-    embedding.base_face.iter_mut().for_each(base);
-    maps.iter_mut().flat_map(|m| &mut m.base_face).for_each(base);
-    let (measures, _, _) = measure_patches(&maps, &bending);
-    let place = |f: u32| {
-        let corners = mesh.face_vertices(FaceId(f)).map(|v| mesh.position(v));
-        ((corners[0] + corners[1] + corners[2]) / 3.0).to_array()
-    };
-    let reason = |r: FlipReason| match r {
-        FlipReason::HighValence { quarters, triangles, .. } => {
-            format!("{triangles} triangles cannot span the {quarters} quarter turns around their node")
-        }
-        FlipReason::Fixed => "the constraints leave it no choice".to_owned(),
-        FlipReason::NotResolved => "no map without this fold was found".to_owned(),
-    };
-    let report = EmbeddingReport {
-        steps: 0,
-        energy_before: 0.0,
-        energy_after: state.least_squares() / area,
-        flipped_before: 0,
-        flipped_at_rest: 0,
-        folds: folds.iter().map(|f| RemainingFlip { at: place(f.triangle), reason: reason(f.reason) }).collect(),
-        collapsed: Vec::new(),
-        short: Vec::new(),
-        features: state.features(sharp),
-        measures,
-    };
-    Ok(OptimisedEmbedding { layout, embedding, maps, initial_embedding: None, report })
+    let flipped = optimiser.finalise(progress)?;
+    extract_embedding(problem, (optimiser.state(), &optimiser.sharp), &flipped, progress)
 }

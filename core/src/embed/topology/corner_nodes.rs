@@ -1,68 +1,71 @@
-//! Nodes at corners of features.
+//! Moving nodes to corners of features.
 //!
-//! Where features meet in a corner, or a feature bends by about a right angle, the surface itself says which node belongs
-//! there: as many quarters as the angles around the corner hold. The nearest node of that valence is brought there, along
-//! edges and with its arcs in tow, before anything is solved for; a corner that no node is near enough to stays without.
+//! At a vertex where features meet, or where one bends by about a right angle, the surface determines the valence of
+//! the node that fits there: the angle around the vertex in quarter turns, rounded. Before anything is solved for, the
+//! nearest irregular node of that valence is moved to the corner along edges, nearest pairs first. A corner without a
+//! node near enough stays without one.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::mesh::{HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{Dijkstra, HalfedgeId, TriMesh, VertexId};
 
-/// How far a node is fetched, as a fraction of the bounding-box diagonal: farther ones belong to other parts.
+/// Distance along edges below which a node is moved to a corner, as a fraction of the bounding-box diagonal: farther
+/// nodes belong to other parts of the surface.
 const REACH: f64 = 0.2;
-/// Cosine above which two features at a vertex go straight on: half way to a right angle.
+/// Cosine of the angle between two feature edges at a vertex up to which they continue each other: 135°, half way
+/// between straight and a right angle.
 const STRAIGHT: f64 = -std::f64::consts::FRAC_1_SQRT_2;
 
-/// Brings nodes to the corners of features that are theirs; `held` nodes stay.
+/// Moves nodes to the corners of features where they fit; `pinned` nodes stay. `sharp` tells for each edge whether it
+/// is one of a feature.
 pub(in crate::embed) fn move_nodes_to_corners(
-    net: &mut EmbeddingTopology,
+    topology: &mut EmbeddingTopology,
     sharp: &[bool],
-    held: impl Fn(usize) -> bool,
+    pinned: impl Fn(usize) -> bool,
 ) {
-    let corners = corners(&net.mesh, sharp);
+    let corners = corners(&topology.mesh, sharp);
     let mut pairs: Vec<(f64, usize, VertexId)> = Vec::new();
     for &(corner, valence) in &corners {
-        let distance = distances(&net.mesh, corner, |_| true);
-        for (i, n) in net.nodes.iter().enumerate() {
-            let d = distance[n.vertex.index()];
-            if n.valence == valence && !n.boundary && !n.is_regular() && !held(i) && d.0 < REACH {
-                pairs.push((d.0, i, corner));
+        let search = paths_to(&topology.mesh, corner, |_| true);
+        for (i, n) in topology.nodes.iter().enumerate() {
+            let distance = search.distance(n.vertex);
+            if n.valence == valence && !n.boundary && !n.is_regular() && !pinned(i) && distance < REACH {
+                pairs.push((distance, i, corner));
             }
         }
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut done = vec![false; net.nodes.len()];
+    let mut placed = vec![false; topology.nodes.len()];
     for (_, node, corner) in pairs {
-        let taken = |net: &EmbeddingTopology, v: VertexId| {
-            net.nodes.iter().enumerate().any(|(i, n)| i != node && n.vertex == v)
+        let taken = |topology: &EmbeddingTopology, v: VertexId| {
+            topology.nodes.iter().enumerate().any(|(i, n)| i != node && n.vertex == v)
         };
-        if done[node] || taken(net, corner) || net.nodes.iter().zip(&done).any(|(n, &d)| d && n.vertex == corner) {
+        if placed[node] || taken(topology, corner) {
             continue;
         }
-        let way = distances(&net.mesh, corner, |v| {
-            v == net.nodes[node].vertex || !(taken(net, v) || net.mesh.is_boundary_vertex(v))
+        let towards = paths_to(&topology.mesh, corner, |v| {
+            v == topology.nodes[node].vertex || !(taken(topology, v) || topology.mesh.is_boundary_vertex(v))
         });
         let mut path = Vec::new();
-        let mut at = net.nodes[node].vertex;
-        while let Some(h) = way[at.index()].1 {
+        let mut at = topology.nodes[node].vertex;
+        while let Some(h) = towards.via(at) {
             path.push(h);
-            at = net.mesh.target(h);
+            at = topology.mesh.target(h);
         }
         if at == corner {
             for h in path {
-                net.move_node(node, h);
+                topology.move_node(node, h);
             }
-            done[node] = true;
+            placed[node] = true;
         }
     }
 }
 
-/// The corners of features inside the surface and their numbers of quarters.
+/// The corners of features inside the surface, and the valence that fits each; those of valence 4 need no irregular
+/// node.
 fn corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<(VertexId, usize)> {
     let inner = mesh.vertices().filter(|&v| !mesh.is_boundary_vertex(v));
     inner
@@ -76,25 +79,21 @@ fn corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<(VertexId, usize)> {
         .collect()
 }
 
-/// For each vertex its distance along edges from `from` through vertices that are `open`, and the half-edge that leads
-/// back there.
-fn distances(mesh: &TriMesh, from: VertexId, open: impl Fn(VertexId) -> bool) -> Vec<(f64, Option<HalfedgeId>)> {
-    let mut best = vec![(f64::INFINITY, None); mesh.n_vertices()];
-    best[from.index()].0 = 0.0;
-    let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
-    while let Some(Reverse((bits, v))) = queue.pop() {
-        let d = f64::from_bits(bits);
-        if d > best[v.index()].0 || d > REACH {
-            continue;
+/// The shortest edge paths to `corner` from vertices within [`REACH`], through vertices that are `open`: each vertex is
+/// reached by its half-edge towards the corner.
+fn paths_to(mesh: &TriMesh, corner: VertexId, open: impl Fn(VertexId) -> bool) -> Dijkstra<VertexId, HalfedgeId> {
+    let mut search = Dijkstra::new(mesh.n_vertices());
+    search.start(corner, 0.0);
+    while let Some((v, distance)) = search.settle() {
+        if distance > REACH {
+            break;
         }
         for h in mesh.outgoing(v) {
             let (Some(back), w) = (mesh.twin(h), mesh.target(h)) else { continue };
-            let far = d + mesh.vector(h).length();
-            if open(w) && far < best[w.index()].0 {
-                best[w.index()] = (far, Some(back));
-                queue.push(Reverse((far.to_bits(), w)));
+            if open(w) {
+                search.reach(w, distance + mesh.vector(h).length(), back);
             }
         }
     }
-    best
+    search
 }

@@ -1,42 +1,44 @@
-//! A layout on a mesh up to homotopy: what a parameterization has to know of it.
+//! The topology of an embedding: a layout on a mesh up to homotopy, which is all that the parameterisation needs.
 //!
-//! Nodes are vertices of a triangle mesh, arcs are chains of triangles from node to node, and the directions of a
-//! cross field are tied to the layout: in every region between arcs there is a chart in which each arc of its border
-//! has a heading, and crossing an arc leads from one chart to the next by the difference of headings. Each triangle
-//! takes the chart of one point in it; that makes a period jump, in quarter turns, of every edge.
+//! Nodes are vertices of a triangle mesh, arcs are chains of triangles from node to node. Every region between arcs has
+//! a chart in which each arc on its border has a heading (a direction 0 to 3); from one region to the next the chart
+//! turns by the difference of the headings of the arc between them. Each triangle takes the chart of one point in it,
+//! which gives every edge a period jump.
 //!
-//! This fixes the topology of the field completely (Campen, section 6.3.1): around a node of valence `k` it turns by
-//! `−k` quarters against the node's arcs, along arcs it continues. Turning numbers along generators and boundaries
-//! need not be computed one by one and zipped together: they are sums of these jumps.
+//! The jumps fix the topology of the field completely (Campen, section 6.3.1): its turning number around a node of
+//! valence `k` is `−k/4`, and each arc keeps its direction. The turning numbers along generators and boundaries are
+//! sums of these jumps, so that they need not be computed one by one and zipped together.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 use crate::dual::{Mark, next};
 use crate::embed::EmbeddingError;
-use crate::embed::topology::node_insertion::Working;
-use crate::embed::topology::period_jumps;
+use crate::embed::topology::node_insertion::WorkingMesh;
+use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps, turns_along};
+// Shared with the rooms that walk over triangles of a topology.
+pub(in crate::embed) use crate::embed::topology::period_jumps::jump_across;
 use crate::layout::{Embedding, QuadLayout};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
 
-/// A node of the layout on the mesh.
+/// A node of the layout as a vertex of the mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopologyNode {
-    /// Its vertex.
+    /// The vertex of the mesh.
     pub vertex: VertexId,
-    /// Number of quarters (patch corners) around it.
+    /// Number of patch corners at the node; each is a quarter turn in the map.
     pub valence: usize,
     /// Whether it lies on the boundary.
     pub boundary: bool,
 }
 
 impl TopologyNode {
-    /// Whether the field is regular there.
+    /// Whether the field is regular at the node.
     pub fn is_regular(&self) -> bool {
         self.index() == 0
     }
 
-    /// Index of the field there, in quarters; at the boundary against the boundary's direction.
+    /// Index of the field at the node, in quarter turns; at the boundary relative to the boundary's direction.
     pub fn index(&self) -> i32 {
         (if self.boundary { 2 } else { 4 }) - self.valence as i32
     }
@@ -49,17 +51,17 @@ pub struct TopologyArc {
     pub nodes: [u32; 2],
     /// The corner it starts at: a half-edge whose origin is the first node, in the chain's first triangle.
     pub start: HalfedgeId,
-    /// The half-edges crossed, each of the triangle that is left.
+    /// The half-edges crossed from the first triangle to the last, each of the triangle that is left.
     pub crossed: Vec<HalfedgeId>,
-    /// The corner it ends at, in the last triangle.
+    /// The corner it ends at: a half-edge whose origin is the second node, in the chain's last triangle.
     pub end: HalfedgeId,
-    /// The direction (0 to 3) of the first triangle's cross along which it runs.
+    /// The direction (0 to 3) of the first triangle's cross in which it runs.
     pub heading: u8,
     /// Whether it runs along the boundary.
     pub boundary: bool,
 }
 
-/// A layout on a mesh, up to homotopy.
+/// A layout on a mesh up to homotopy.
 #[derive(Debug, Clone)]
 pub struct EmbeddingTopology {
     /// The mesh, with a vertex for every node.
@@ -68,21 +70,22 @@ pub struct EmbeddingTopology {
     pub base_face: Vec<FaceId>,
     /// Period jump of each edge, exact as an integer: as [`crate::field::CrossField::jump`], but not reduced.
     pub jump: Vec<i32>,
-    /// Direction 0 of each triangle's cross in the rough drawing, from half-edge 0: a guess only.
+    /// Angle of direction 0 of each triangle's cross, from half-edge 0: that of a smooth field along the arcs of the
+    /// initial embedding, a first guess.
     pub angle: Vec<f64>,
     /// The nodes, as in the layout.
     pub nodes: Vec<TopologyNode>,
     /// The arcs, as in the layout.
     pub arcs: Vec<TopologyArc>,
-    /// For each boundary half-edge the direction of its triangle's cross that runs along it, and its arc.
+    /// For each boundary half-edge the direction (0 to 3) of its triangle's cross that runs along it, and its arc.
     pub boundary: HashMap<HalfedgeId, (u8, u32)>,
 }
 
-/// The headings of an arc's two sides: in the region to its left when it is run through forward, and in the one to
-/// its left backward.
+/// The headings (0 to 3) of an arc on its two sides: that of the forward half-arc in the chart of the region to its
+/// left, and that of the backward half-arc in the chart of the region to its left; `None` where there is no region.
 pub type ArcHeadings = [Option<u8>; 2];
 
-/// The headings of the arcs of a complete layout: every patch is its own chart, its side `i` heading along `i`.
+/// The headings of the arcs of a complete layout: every patch is a chart, in which side `i` has heading `i`.
 pub fn arc_headings(layout: &QuadLayout) -> Vec<ArcHeadings> {
     let mut of = vec![[None; 2]; layout.arcs.len()];
     for patch in &layout.patches {
@@ -94,42 +97,39 @@ pub fn arc_headings(layout: &QuadLayout) -> Vec<ArcHeadings> {
 }
 
 impl EmbeddingTopology {
-    /// Transfers a drawn layout to the triangles of `surface`.
+    /// The topology of an initial embedding on the triangles of `surface`, with the headings of each arc.
     ///
     /// # Errors
     ///
-    /// See [`EmbeddingError`].
+    /// [`EmbeddingError::Node`], [`EmbeddingError::Arc`] or [`EmbeddingError::Edge`] where the embedding is not one of
+    /// `layout` on `surface`, [`EmbeddingError::Turning`] where the headings do not fit together.
     pub fn new(
         surface: &TriMesh,
         embedding: &Embedding,
         layout: &QuadLayout,
         arc_headings: &[ArcHeadings],
     ) -> Result<Self, EmbeddingError> {
-        let working = Working::new(surface, embedding)?;
+        let working = WorkingMesh::new(surface, embedding)?;
         let charts = Charts::new(&working, arc_headings);
         let arcs = (0..layout.arcs.len())
             .map(|a| charts.arc(&working, layout, a).ok_or(EmbeddingError::Arc { arc: a }))
             .collect::<Result<_, _>>()?;
         let jump = charts.jumps(&working)?;
         let boundary = charts.boundary(&working);
-        let guides = charts.directions(&working);
+        let hints = charts.directions(&working);
         let nodes: Vec<TopologyNode> = working
             .nodes
             .iter()
             .zip(&layout.nodes)
             .map(|(&vertex, n)| TopologyNode { vertex, valence: n.valence, boundary: n.boundary })
             .collect();
-        let Working { mesh, base_face, .. } = working;
+        let WorkingMesh { mesh, base_face, .. } = working;
         let metric = Metric::new(&mesh);
-        let mut index = vec![0; mesh.n_vertices()];
-        for n in nodes.iter().filter(|n| !n.boundary) {
-            index[n.vertex.index()] = n.index();
-        }
-        let (jump, angle) = period_jumps::lift(&mesh, &metric, &jump, &guides, &index)?;
+        let (jump, angle) = integer_jumps(&mesh, &metric, &jump, &hints, &node_indices(&mesh, &nodes))?;
         Ok(Self { mesh, base_face, jump, angle, nodes, arcs, boundary })
     }
 
-    /// For each vertex the angle around it in a map, in quarter turns; 0 on the boundary, where it is open.
+    /// For each vertex the angle around it in a map, in quarter turns; 0 on the boundary, where it is not prescribed.
     pub(in crate::embed) fn quarters(&self) -> Vec<u32> {
         let mesh = &self.mesh;
         let mut quarters: Vec<u32> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { 0 } else { 4 }).collect();
@@ -144,53 +144,55 @@ impl EmbeddingTopology {
     pub fn jump_across(&self, h: HalfedgeId) -> i32 {
         jump_across(&self.mesh, &self.jump, h)
     }
+
+    /// The sum of the period jumps across a chain of half-edges.
+    pub(in crate::embed) fn turns_along(&self, crossed: &[HalfedgeId]) -> i32 {
+        turns_along(&self.mesh, &self.jump, crossed)
+    }
 }
 
-/// The jump across `h`, from its triangle to that of its twin.
-#[inline]
-pub(in crate::embed) fn jump_across(mesh: &TriMesh, jump: &[i32], h: HalfedgeId) -> i32 {
-    let e = mesh.edge(h);
-    if mesh.halfedge(e) == h { jump[e.index()] } else { -jump[e.index()] }
+/// The index of each vertex in quarter turns: that of its node, or 0 where there is no node inside the surface.
+pub(super) fn node_indices(mesh: &TriMesh, nodes: &[TopologyNode]) -> Vec<i32> {
+    let mut index = vec![0; mesh.n_vertices()];
+    for n in nodes.iter().filter(|n| !n.boundary) {
+        index[n.vertex.index()] = n.index();
+    }
+    index
 }
 
-/// How the faces of the drawing see the crosses of the working triangles.
+/// How the charts of the regions between arcs are turned against the crosses of the working triangles.
 struct Charts {
-    /// For each face of the drawing the quarters `j` such that its direction `k` is direction `k + j` of the working
-    /// triangle it lies in.
+    /// For each face of the refined mesh the quarter turns `j` such that direction `k` of its region's chart is
+    /// direction `k + j` of the working triangle it lies in.
     frame: Vec<i32>,
-    /// Headings of the arcs' sides.
     arc_headings: Vec<ArcHeadings>,
-    /// Arc and sense of each marked half-edge of the drawing.
+    /// For each half-edge of the refined mesh on an arc the arc, and whether it is run through forward.
     along: HashMap<u32, (u32, bool)>,
 }
 
 impl Charts {
-    fn new(working: &Working, arc_headings: &[ArcHeadings]) -> Self {
-        let drawing = &working.drawing;
+    fn new(working: &WorkingMesh, arc_headings: &[ArcHeadings]) -> Self {
+        let refined = &working.refined;
         let mut along = HashMap::new();
         for (a, path) in working.arcs.iter().enumerate() {
             for w in path.windows(2) {
                 for (from, to, forward) in [(w[0], w[1], true), (w[1], w[0], false)] {
-                    let h = drawing.outgoing(from).into_iter().find(|&h| drawing.target(h) == to);
+                    let h = refined.outgoing(from).into_iter().find(|&h| refined.target(h) == to);
                     along.extend(h.map(|h| (h, (a as u32, forward))));
                 }
             }
         }
-        let mut charts = Self { frame: vec![i32::MIN; drawing.n_faces()], arc_headings: arc_headings.to_vec(), along };
-        // One face of each working triangle speaks for it; the frames of the others follow from it.
-        for seed in 0..drawing.n_faces() as u32 {
-            if charts.frame[seed as usize] != i32::MIN {
-                continue;
-            }
-            charts.frame[seed as usize] = 0;
-            let mut queue = VecDeque::from([seed]);
-            while let Some(f) = queue.pop_front() {
+        let mut charts = Self { frame: vec![0; refined.n_faces()], arc_headings: arc_headings.to_vec(), along };
+        // The first face of each working triangle gives it its frame; the frames of its other faces follow by a flood.
+        let mut search = BreadthFirst::new(refined.n_faces());
+        for seed in 0..refined.n_faces() as u32 {
+            search.start(seed);
+            while let Some(f) = search.visit() {
                 for h in 3 * f..3 * f + 3 {
-                    let Some(t) = drawing.twin(h) else { continue };
+                    let Some(t) = refined.twin(h) else { continue };
                     let g = t / 3;
-                    if drawing.tag[g as usize] == drawing.tag[f as usize] && charts.frame[g as usize] == i32::MIN {
+                    if refined.tag[g as usize] == refined.tag[f as usize] && search.reach(g, ()) {
                         charts.frame[g as usize] = charts.frame[f as usize] + charts.rotation(working, h, t);
-                        queue.push_back(g);
                     }
                 }
             }
@@ -198,15 +200,16 @@ impl Charts {
         charts
     }
 
-    /// The heading of a marked half-edge in the region to its left.
+    /// The heading of a half-edge on an arc in the chart of the region to its left.
     fn heading(&self, h: u32) -> Option<i32> {
         let &(arc, forward) = self.along.get(&h)?;
         self.arc_headings[arc as usize][usize::from(!forward)].map(i32::from)
     }
 
-    /// The jump between the region charts on both sides of a half-edge of the drawing, from its own to its twin's.
-    fn rotation(&self, working: &Working, h: u32, twin: u32) -> i32 {
-        if working.drawing.mark(h) == Mark::Free {
+    /// The jump between the charts of the regions on both sides of a half-edge of the refined mesh, from its own to its
+    /// twin's: 0 inside a region.
+    fn rotation(&self, working: &WorkingMesh, h: u32, twin: u32) -> i32 {
+        if working.refined.mark(h) == Mark::Free {
             return 0;
         }
         match (self.heading(h), self.heading(twin)) {
@@ -215,17 +218,17 @@ impl Charts {
         }
     }
 
-    /// The jump of every working edge, from 0 to 3.
-    fn jumps(&self, working: &Working) -> Result<Vec<i32>, EmbeddingError> {
-        let (mesh, drawing) = (&working.mesh, &working.drawing);
+    /// The jump of every edge of the working mesh, from 0 to 3.
+    fn jumps(&self, working: &WorkingMesh) -> Result<Vec<i32>, EmbeddingError> {
+        let (mesh, refined) = (&working.mesh, &working.refined);
         let mut jump = vec![i32::MIN; mesh.n_edges()];
-        for h in 0..3 * drawing.n_faces() as u32 {
+        for h in 0..3 * refined.n_faces() as u32 {
             let Some(crossed) = working.crossing(h) else { continue };
             let edge = mesh.edge(crossed);
             if mesh.halfedge(edge) != crossed || jump[edge.index()] != i32::MIN {
                 continue;
             }
-            let Some(t) = drawing.twin(h) else { continue };
+            let Some(t) = refined.twin(h) else { continue };
             let frame = |h: u32| self.frame[h as usize / 3];
             jump[edge.index()] = (frame(h) + self.rotation(working, h, t) - frame(t)).rem_euclid(4);
         }
@@ -239,23 +242,24 @@ impl Charts {
         Ok(jump)
     }
 
-    /// The chain of an arc, to the left of its path where that lies on the surface, else to its right.
-    fn arc(&self, working: &Working, layout: &QuadLayout, a: usize) -> Option<TopologyArc> {
+    /// The chain of an arc: the triangles to the left of its path, or to its right where there is no region on the
+    /// left.
+    fn arc(&self, working: &WorkingMesh, layout: &QuadLayout, a: usize) -> Option<TopologyArc> {
         let arc = &layout.arcs[a];
         let mut path = working.arcs[a].clone();
         let backward = self.arc_headings[a][0].is_none();
         if backward {
             path.reverse();
         }
-        let drawing = &working.drawing;
-        let step = |w: &[u32]| drawing.outgoing(w[0]).into_iter().find(|&h| drawing.target(h) == w[1]);
+        let refined = &working.refined;
+        let step = |w: &[u32]| refined.outgoing(w[0]).into_iter().find(|&h| refined.target(h) == w[1]);
         let halfedges: Vec<u32> = path.windows(2).map(step).collect::<Option<_>>()?;
         let mut crossed = Vec::new();
         for pair in halfedges.windows(2) {
             let mut n = next(pair[0]);
             while n != pair[1] {
                 crossed.extend(working.crossing(n));
-                n = next(drawing.twin(n)?);
+                n = next(refined.twin(n)?);
             }
         }
         let corner = |h: u32, node: u32| working.corner(h / 3, working.nodes[node as usize]);
@@ -272,12 +276,13 @@ impl Charts {
         })
     }
 
-    fn boundary(&self, working: &Working) -> HashMap<HalfedgeId, (u8, u32)> {
-        let (mesh, drawing) = (&working.mesh, &working.drawing);
+    /// See [`EmbeddingTopology::boundary`].
+    fn boundary(&self, working: &WorkingMesh) -> HashMap<HalfedgeId, (u8, u32)> {
+        let (mesh, refined) = (&working.mesh, &working.refined);
         let mut out = HashMap::new();
         for h in mesh.halfedges().filter(|&h| mesh.twin(h).is_none()) {
-            // The drawing's boundary half-edge that leaves the same vertex.
-            let g = drawing.outgoing(working.drawn[mesh.origin(h).index()])[0];
+            // The boundary half-edge of the refined mesh that leaves the same vertex.
+            let g = refined.outgoing(working.refined_vertex[mesh.origin(h).index()])[0];
             if let (Some(k), Some(&(arc, _))) = (self.heading(g), self.along.get(&g)) {
                 out.insert(h, ((k + self.frame[g as usize / 3]).rem_euclid(4) as u8, arc));
             }
@@ -285,19 +290,19 @@ impl Charts {
         out
     }
 
-    /// Direction 0 of each working triangle that arcs pass through, in space, by the arcs' own directions and lengths:
-    /// pairs of a vector along an arc and the direction index it stands for.
-    fn directions(&self, working: &Working) -> Vec<(FaceId, glam::DVec3, i32)> {
-        let drawing = &working.drawing;
+    /// The directions of the arcs in the working triangles they pass through, one hint for each edge of the refined
+    /// mesh.
+    fn directions(&self, working: &WorkingMesh) -> Vec<DirectionHint> {
+        let refined = &working.refined;
         let mut halfedges: Vec<u32> = self.along.keys().copied().collect();
         halfedges.sort_unstable();
-        let position = |v: u32| drawing.positions[v as usize];
+        let position = |v: u32| refined.positions[v as usize];
         halfedges
             .into_iter()
             .filter_map(|h| {
                 let k = self.heading(h)? + self.frame[h as usize / 3];
-                let along = position(drawing.target(h)) - position(drawing.origin(h));
-                Some((FaceId(drawing.tag[h as usize / 3]), along, k))
+                let vector = position(refined.target(h)) - position(refined.origin(h));
+                Some(DirectionHint { face: FaceId(refined.tag[h as usize / 3]), vector, direction: k })
             })
             .collect()
     }

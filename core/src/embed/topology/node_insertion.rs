@@ -1,8 +1,9 @@
-//! The working mesh of an embedding: the surface's own triangles, with a vertex for every node.
+//! The working mesh of an embedding: the triangles of the surface, with a vertex for every node.
 //!
-//! A node that already is a vertex of the surface stays. Any other is inserted: its triangle is split in three, or
-//! the two triangles of its edge in two each. The drawing of the arcs, a refinement of the same surface, is cut
-//! along the new edges too, so that each of its triangles lies in one working triangle.
+//! A node at a vertex of the surface stays there. Any other node is inserted: its triangle is split in three, or each
+//! triangle beside its edge in two. The initial embedding lives on a refinement of the same surface, in which arcs are
+//! edge paths. The new edges are inserted into that refined mesh too, so that each of its faces lies in one working
+//! triangle.
 
 use std::collections::HashMap;
 
@@ -13,38 +14,39 @@ use crate::embed::EmbeddingError;
 use crate::layout::Embedding;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
-/// The mesh a layout is optimised on, and the rough drawing of the layout in terms of it.
-pub(in crate::embed) struct Working {
-    /// The surface with a vertex for every node; the first vertices and triangles are those of the surface.
+/// The mesh that a layout is optimised on, and the initial embedding of the layout in terms of it.
+pub(super) struct WorkingMesh {
+    /// The surface with a vertex for every node. The vertices of the surface come first; triangle `f` of the surface,
+    /// or a part of it, is triangle `f`.
     pub mesh: TriMesh,
     /// Triangle of the surface that each triangle lies in.
     pub base_face: Vec<FaceId>,
     /// Vertex of each node.
     pub nodes: Vec<VertexId>,
-    /// The drawing; the tag of a face is the working triangle it lies in.
-    pub drawing: RefinedMesh,
-    /// Vertices of each arc in the drawing, from its first node to its second.
+    /// The mesh of the initial embedding; the tag of a face is the working triangle it lies in.
+    pub refined: RefinedMesh,
+    /// Vertices of each arc in the refined mesh, from its first node to its second.
     pub arcs: Vec<Vec<u32>>,
-    /// Vertex of the drawing for each vertex.
-    pub drawn: Vec<u32>,
+    /// The vertex of the refined mesh at each vertex of the working mesh.
+    pub refined_vertex: Vec<u32>,
 }
 
-impl Working {
-    /// Builds the working mesh of `embedding` on `surface`, of which the embedding's first vertices are the vertices.
+impl WorkingMesh {
+    /// The working mesh of `embedding` on `surface`; the first vertices of the embedding's mesh are those of the
+    /// surface.
     ///
     /// # Errors
     ///
     /// [`EmbeddingError::Node`] where a node cannot be joined to the corners of its triangle.
-    pub(in crate::embed) fn new(surface: &TriMesh, embedding: &Embedding) -> Result<Self, EmbeddingError> {
-        let mut drawing = embedding.mesh.clone();
-        for f in 0..drawing.n_faces() {
-            drawing.tag[f] = embedding.base_face[drawing.base_face(f as u32) as usize];
+    pub(super) fn new(surface: &TriMesh, embedding: &Embedding) -> Result<Self, EmbeddingError> {
+        let mut refined = embedding.mesh.clone();
+        for f in 0..refined.n_faces() {
+            refined.tag[f] = embedding.base_face[refined.base_face(f as u32) as usize];
         }
         let mut faces: Vec<[u32; 3]> = surface.faces().map(|f| surface.face_vertices(f).map(|v| v.0)).collect();
         let mut base_face: Vec<FaceId> = surface.faces().collect();
         let mut positions = surface.positions().to_vec();
-        // Vertex of the drawing for each vertex of the working mesh.
-        let mut drawn: Vec<u32> = (0..positions.len() as u32).collect();
+        let mut refined_vertex: Vec<u32> = (0..positions.len() as u32).collect();
         let mut arcs = embedding.arcs.clone();
         let mut nodes = Vec::with_capacity(embedding.nodes.len());
         for (n, &x) in embedding.nodes.iter().enumerate() {
@@ -53,27 +55,28 @@ impl Working {
                 continue;
             }
             let mut inserter = Inserter {
-                drawing: &mut drawing,
+                refined: &mut refined,
                 faces: &mut faces,
                 base_face: &mut base_face,
-                drawn: &drawn,
+                refined_vertex: &refined_vertex,
                 n_surface: surface.n_vertices(),
                 arcs: &mut arcs,
             };
             let vertex = positions.len() as u32;
             inserter.insert(x, vertex).ok_or(EmbeddingError::Node { node: n })?;
-            positions.push(drawing.positions[x as usize]);
-            drawn.push(x);
+            positions.push(refined.positions[x as usize]);
+            refined_vertex.push(x);
             nodes.push(VertexId(vertex));
         }
         let mesh = TriMesh::from_faces(positions, &faces)?;
-        Ok(Self { mesh, base_face, nodes, drawing, arcs, drawn })
+        Ok(Self { mesh, base_face, nodes, refined, arcs, refined_vertex })
     }
 
-    /// The working half-edge that half-edge `h` of the drawing lies on; `None` inside a working triangle.
-    pub(in crate::embed) fn crossing(&self, h: u32) -> Option<HalfedgeId> {
-        let t = self.drawing.twin(h)?;
-        let (f, g) = (self.drawing.tag[h as usize / 3], self.drawing.tag[t as usize / 3]);
+    /// The half-edge of the working mesh that half-edge `h` of the refined mesh lies on; `None` inside a working
+    /// triangle and on the boundary.
+    pub(super) fn crossing(&self, h: u32) -> Option<HalfedgeId> {
+        let t = self.refined.twin(h)?;
+        let (f, g) = (self.refined.tag[h as usize / 3], self.refined.tag[t as usize / 3]);
         if f == g {
             return None;
         }
@@ -81,34 +84,36 @@ impl Working {
         sides.into_iter().find(|&s| self.mesh.twin(s).is_some_and(|t| self.mesh.face(t).0 == g))
     }
 
-    /// The corner of the working triangle of face `f` of the drawing at `v`.
-    pub(in crate::embed) fn corner(&self, f: u32, v: VertexId) -> Option<HalfedgeId> {
-        let sides = self.mesh.face_halfedges(FaceId(self.drawing.tag[f as usize]));
+    /// The corner at `v` of the working triangle that face `f` of the refined mesh lies in.
+    pub(super) fn corner(&self, f: u32, v: VertexId) -> Option<HalfedgeId> {
+        let sides = self.mesh.face_halfedges(FaceId(self.refined.tag[f as usize]));
         sides.into_iter().find(|&s| self.mesh.origin(s) == v)
     }
 }
 
+/// Inserts nodes one by one into the working triangles and into the refined mesh.
 struct Inserter<'a> {
-    drawing: &'a mut RefinedMesh,
+    refined: &'a mut RefinedMesh,
     faces: &'a mut Vec<[u32; 3]>,
     base_face: &'a mut Vec<FaceId>,
-    /// Vertex of the drawing for each working vertex.
-    drawn: &'a [u32],
-    /// Number of vertices of the surface: these are the same in the drawing.
+    /// See [`WorkingMesh::refined_vertex`].
+    refined_vertex: &'a [u32],
+    /// Number of vertices of the surface, which are the first of the refined mesh, too.
     n_surface: usize,
     arcs: &'a mut Vec<Vec<u32>>,
 }
 
-/// The mark of new edges while they are drawn: no curve has this index.
-const SPOKE: Mark = Mark::Curve(u32::MAX);
+/// The mark of the new edges at a node until the parts of its triangle are tagged: no curve has this index.
+const NEW_EDGE: Mark = Mark::Curve(u32::MAX);
 
 impl Inserter<'_> {
-    /// Makes drawn vertex `x` the working vertex `vertex`.
+    /// Makes vertex `x` of the refined mesh vertex `vertex` of the working mesh; `None` if that cannot be done.
     fn insert(&mut self, x: u32, vertex: u32) -> Option<()> {
-        let mut around: Vec<u32> = self.drawing.outgoing(x).iter().map(|h| self.drawing.tag[*h as usize / 3]).collect();
+        let mut around: Vec<u32> = self.refined.outgoing(x).iter().map(|h| self.refined.tag[*h as usize / 3]).collect();
         around.sort_unstable();
         around.dedup();
-        // Inside a triangle every corner is joined; on an edge each triangle beside it joins its opposite corner.
+        // Inside a triangle `x` is joined to each corner; on an edge it is joined to the opposite corner of each
+        // triangle.
         let ends = match around.as_slice() {
             [f] => self.boundary_ends(x, *f),
             [f, g] => {
@@ -125,44 +130,45 @@ impl Inserter<'_> {
 
     /// The ends of the boundary edge of `f` that `x` lies on, if it does.
     fn boundary_ends(&self, x: u32, f: u32) -> Option<Vec<u32>> {
-        let first = self.drawing.outgoing(x)[0];
-        if !self.drawing.is_boundary(first) {
+        let first = self.refined.outgoing(x)[0];
+        if !self.refined.is_boundary(first) {
             return None;
         }
-        // Along the boundary both ways to the next working vertices.
+        // Forward along the boundary to the next corner; the other end is the corner before it.
         let corners = self.faces[f as usize];
-        let is_corner = |v: u32| corners.into_iter().find(|&c| self.drawn[c as usize] == v);
+        let is_corner = |v: u32| corners.into_iter().find(|&c| self.refined_vertex[c as usize] == v);
         let mut h = first;
         let onward = loop {
-            let v = self.drawing.target(h);
+            let v = self.refined.target(h);
             if let Some(c) = is_corner(v) {
                 break c;
             }
-            h = self.drawing.outgoing(v)[0];
+            h = self.refined.outgoing(v)[0];
         };
         let at = corners.iter().position(|&c| c == onward)?;
         Some(vec![onward, corners[(at + 2) % 3]])
     }
 
-    /// Splits working triangle `f` at `x`; on an edge only across from `ends`.
+    /// Splits working triangle `f` at `x`, which lies on the side between `ends`, or inside the triangle if there are
+    /// none.
     fn split(&mut self, f: u32, x: u32, vertex: u32, ends: Option<&[u32]>) -> Option<()> {
         let corners = self.faces[f as usize];
         let on_edge = |v: u32| ends.is_some_and(|e| e.contains(&v));
-        let plane = Plane::new(corners.map(|c| self.drawing.positions[self.drawn[c as usize] as usize]));
+        let plane = Plane::new(corners.map(|c| self.refined.positions[self.refined_vertex[c as usize] as usize]));
         for c in corners.into_iter().filter(|&c| !on_edge(c)) {
             let path = self
-                .drawing
+                .refined
                 .insert_path(
-                    (x, self.drawn[c as usize]),
-                    SPOKE,
+                    (x, self.refined_vertex[c as usize]),
+                    NEW_EDGE,
                     |m, face| m.tag[face as usize] == f,
-                    |mark| mark == SPOKE,
-                    |m, v| plane.flat(m.positions[v as usize]),
+                    |mark| mark == NEW_EDGE,
+                    |m, v| plane.project(m.positions[v as usize]),
                 )
                 .ok()?;
-            self.pass_on(&path);
+            self.insert_crossings(&path);
         }
-        // The new triangles lie beside the sides that `x` is not on.
+        // One new triangle for each side that `x` does not lie on; the first takes the number `f`.
         let mut first = true;
         for i in 0..3 {
             let (a, b) = (corners[i], corners[(i + 1) % 3]);
@@ -175,22 +181,22 @@ impl Inserter<'_> {
             } else {
                 self.faces.push([vertex, a, b]);
                 self.base_face.push(self.base_face[f as usize]);
-                self.retag(f, id, self.drawn[a as usize], self.drawn[b as usize])?;
+                self.tag_part(f, id, self.refined_vertex[a as usize], self.refined_vertex[b as usize])?;
             }
             first = false;
         }
-        self.unmark(x);
+        self.clear_marks(x);
         Some(())
     }
 
-    /// Inserts the points at which a new edge crosses arcs into these.
-    fn pass_on(&mut self, path: &[u32]) {
+    /// Inserts the vertices at which a new edge crosses arcs into the paths of these arcs.
+    fn insert_crossings(&mut self, path: &[u32]) {
         for &x in &path[1..path.len() - 1] {
-            let spokes = self.drawing.outgoing(x);
+            let outgoing = self.refined.outgoing(x);
             let mut beside: HashMap<u32, Vec<u32>> = HashMap::new();
-            for h in spokes {
-                if let Mark::Arc(a) = self.drawing.mark(h) {
-                    beside.entry(a).or_default().push(self.drawing.target(h));
+            for h in outgoing {
+                if let Mark::Arc(a) = self.refined.mark(h) {
+                    beside.entry(a).or_default().push(self.refined.target(h));
                 }
             }
             for (a, ends) in beside {
@@ -203,23 +209,23 @@ impl Inserter<'_> {
         }
     }
 
-    /// Gives the part of triangle `f` at its side from `a` to `b` (vertices of the drawing) the tag `id`.
-    fn retag(&mut self, f: u32, id: u32, a: u32, b: u32) -> Option<()> {
+    /// Gives the part of triangle `f` at its side from `a` to `b` (vertices of the refined mesh) the tag `id`.
+    fn tag_part(&mut self, f: u32, id: u32, a: u32, b: u32) -> Option<()> {
         let inside = |m: &RefinedMesh, h: u32| m.tag[h as usize / 3] == f;
-        // The first drawn half-edge of the side: it leaves `a` and has the outside of `f` to its right.
-        let seed = self.drawing.outgoing(a).into_iter().find(|&h| {
-            let outside = self.drawing.twin(h).is_none_or(|t| !inside(self.drawing, t));
-            inside(self.drawing, h) && outside && self.leads_to(h, b, f)
+        // The first half-edge on the side: it leaves `a`, and on its right `f` ends.
+        let seed = self.refined.outgoing(a).into_iter().find(|&h| {
+            let outside = self.refined.twin(h).is_none_or(|t| !inside(self.refined, t));
+            inside(self.refined, h) && outside && self.side_ends_at(h, b, f)
         })?;
         let mut stack = vec![seed / 3];
-        self.drawing.tag[seed as usize / 3] = id;
+        self.refined.tag[seed as usize / 3] = id;
         while let Some(face) = stack.pop() {
             for h in 3 * face..3 * face + 3 {
-                if self.drawing.mark(h) == SPOKE {
+                if self.refined.mark(h) == NEW_EDGE {
                     continue;
                 }
-                if let Some(t) = self.drawing.twin(h).filter(|&t| self.drawing.tag[t as usize / 3] == f) {
-                    self.drawing.tag[t as usize / 3] = id;
+                if let Some(t) = self.refined.twin(h).filter(|&t| self.refined.tag[t as usize / 3] == f) {
+                    self.refined.tag[t as usize / 3] = id;
                     stack.push(t / 3);
                 }
             }
@@ -227,21 +233,21 @@ impl Inserter<'_> {
         Some(())
     }
 
-    /// Whether the border of `f` that starts with `h` meets `b` before any other corner of a working triangle.
-    fn leads_to(&self, h: u32, b: u32, f: u32) -> bool {
+    /// Whether the border of `f` that starts with `h` reaches `b` before any other vertex of the working mesh.
+    fn side_ends_at(&self, h: u32, b: u32, f: u32) -> bool {
         let mut h = h;
-        for _ in 0..self.drawing.n_vertices() {
-            let v = self.drawing.target(h);
+        for _ in 0..self.refined.n_vertices() {
+            let v = self.refined.target(h);
             if v == b {
                 return true;
             }
-            if (v as usize) < self.n_surface || self.drawn[self.n_surface..].contains(&v) {
+            if (v as usize) < self.n_surface || self.refined_vertex[self.n_surface..].contains(&v) {
                 return false;
             }
-            // The next border half-edge: turn left around `v` from the triangle of `h` until `f` ends.
+            // The next half-edge on the border: around `v` from the face of `h` until `f` ends.
             let mut n = crate::dual::next(h);
-            while let Some(t) = self.drawing.twin(n).filter(|&t| self.drawing.tag[t as usize / 3] == f) {
-                if self.drawing.mark(n) == SPOKE {
+            while let Some(t) = self.refined.twin(n).filter(|&t| self.refined.tag[t as usize / 3] == f) {
+                if self.refined.mark(n) == NEW_EDGE {
                     return false;
                 }
                 n = crate::dual::next(t);
@@ -251,15 +257,15 @@ impl Inserter<'_> {
         false
     }
 
-    /// Frees the new edges at `x`: from now on tags tell.
-    fn unmark(&mut self, x: u32) {
+    /// Removes the marks of the new edges at `x`; from now on the tags tell the parts apart.
+    fn clear_marks(&mut self, x: u32) {
         let mut stack = vec![x];
         while let Some(v) = stack.pop() {
-            for h in self.drawing.outgoing(v) {
+            for h in self.refined.outgoing(v) {
                 for g in [h, crate::dual::prev(h)] {
-                    if self.drawing.mark(g) == SPOKE {
-                        self.drawing.set_mark(g, Mark::Free);
-                        stack.extend([self.drawing.origin(g), self.drawing.target(g)]);
+                    if self.refined.mark(g) == NEW_EDGE {
+                        self.refined.set_mark(g, Mark::Free);
+                        stack.extend([self.refined.origin(g), self.refined.target(g)]);
                     }
                 }
             }
@@ -267,7 +273,7 @@ impl Inserter<'_> {
     }
 }
 
-/// Coordinates in the plane of a triangle.
+/// Orthonormal coordinates in the plane of a triangle.
 struct Plane {
     origin: DVec3,
     x: DVec3,
@@ -281,7 +287,7 @@ impl Plane {
         Self { origin: a, x, y }
     }
 
-    fn flat(&self, p: DVec3) -> DVec2 {
+    fn project(&self, p: DVec3) -> DVec2 {
         DVec2::new((p - self.origin).dot(self.x), (p - self.origin).dot(self.y))
     }
 }

@@ -1,29 +1,29 @@
-//! Moving a node of a net along an edge.
+//! Moving a node along an edge of the mesh (Campen, section 6.5.1).
 //!
-//! The singularity goes with it: the period jump of the edge changes by the node's index, so that the vertex left
-//! becomes regular (Campen, section 6.5.1). Arcs are dragged along. They all start to the left of the edge at its new
-//! end and first turn counter-clockwise around the old one, to where they started before; clockwise would
-//! be the same, the old vertex being regular now.
+//! The singularity moves with the node: the period jump of the edge changes by the node's index, so that the old vertex
+//! becomes regular. All arcs of the node now start in the triangle to the left of the edge, turn counter-clockwise
+//! around the old vertex, and go on from where they started before. Turning clockwise would be homotopic, for the old
+//! vertex is regular.
 //!
-//! Other arcs that cross the edge are pushed ahead by the node: they are led around the far side of its new vertex.
+//! Other arcs that cross the edge keep their side of the node: they are rerouted around its new vertex on the far side.
 //!
-//! A node on the boundary moves along it. There no jump changes, but the edge now belongs to the arc behind the node.
+//! A node on the boundary moves along it. No jump changes; the edge passes to the boundary arc behind the node.
 
 use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
-use crate::embed::topology::period_jumps;
+use crate::embed::topology::period_jumps::{move_index, turns_along};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
-/// A way from a triangle at a vertex to the corner that an arc had there.
+/// A sequence of triangles around the vertex that a node leaves.
 struct Fan {
-    /// The corner at the node's new vertex, in the triangle the fan starts in.
+    /// The corner at the node's new vertex in the first triangle.
     corner: HalfedgeId,
-    /// The first half-edge to be crossed, or the outgoing one of the first triangle, by sense.
+    /// The corner at the old vertex in the first triangle.
     first: HalfedgeId,
     counter_clockwise: bool,
 }
 
 impl Fan {
-    /// The half-edges crossed on the way to the triangle of `to`.
+    /// The half-edges crossed from the first triangle to that of `to`.
     fn crossed(&self, mesh: &TriMesh, to: HalfedgeId) -> Vec<HalfedgeId> {
         let mut crossed = Vec::new();
         let mut at = self.first;
@@ -38,7 +38,8 @@ impl Fan {
 }
 
 impl EmbeddingTopology {
-    /// Moves a node along the edge of `h`, which leaves its vertex or, on the boundary, may also lead to it.
+    /// Moves a node along the edge of `h` to its other end, which must not be a node. `h` starts at the node's vertex;
+    /// on the boundary, where an edge has one half-edge only, it may also end there.
     pub(in crate::embed) fn move_node(&mut self, node: usize, h: HalfedgeId) {
         let from = self.nodes[node].vertex;
         let forward = self.mesh.origin(h) == from;
@@ -49,15 +50,15 @@ impl EmbeddingTopology {
             Fan { corner: h, first: self.mesh.next(h), counter_clockwise: false }
         };
         if self.nodes[node].boundary {
-            self.move_border(from, h, forward);
+            self.extend_boundary_arc(from, h, forward);
         } else {
-            self.make_way(h);
-            period_jumps::shift(&self.mesh, &mut self.jump, h, self.nodes[node].index());
+            self.reroute_arcs_across(h);
+            move_index(&self.mesh, &mut self.jump, h, self.nodes[node].index());
         }
         let Self { mesh, jump, arcs, .. } = self;
         for arc in arcs {
             if arc.nodes[0] as usize == node && mesh.origin(arc.start) == from {
-                drag_start(mesh, jump, arc, &fan);
+                prepend_fan(mesh, jump, arc, &fan);
             }
             if arc.nodes[1] as usize == node && mesh.origin(arc.end) == from {
                 let mut back = fan.crossed(mesh, arc.end);
@@ -65,13 +66,13 @@ impl EmbeddingTopology {
                 arc.crossed.extend(back.iter().filter_map(|&h| mesh.twin(h)));
                 arc.end = fan.corner;
             }
-            cancel(mesh, &mut arc.crossed);
+            cancel_backtracking(mesh, &mut arc.crossed);
         }
         self.nodes[node].vertex = to;
     }
 
-    /// Leads arcs that cross the edge around its target, which is regular: the node would push them there.
-    fn make_way(&mut self, h: HalfedgeId) {
+    /// Reroutes the arcs that cross `h` around its target, which is a regular vertex.
+    fn reroute_arcs_across(&mut self, h: HalfedgeId) {
         let Self { mesh, arcs, .. } = self;
         let Some(twin) = mesh.twin(h) else { return };
         let fan = Fan { corner: h, first: mesh.next(h), counter_clockwise: false };
@@ -87,18 +88,18 @@ impl EmbeddingTopology {
                 g => vec![g],
             };
             arc.crossed = arc.crossed.iter().flat_map(lead).collect();
-            cancel(mesh, &mut arc.crossed);
+            cancel_backtracking(mesh, &mut arc.crossed);
         }
     }
 
-    /// Gives the boundary edge a node moves along to the arc behind it.
-    fn move_border(&mut self, node: VertexId, h: HalfedgeId, forward: bool) {
+    /// Assigns the boundary edge that a node moves along to the arc behind it.
+    fn extend_boundary_arc(&mut self, node: VertexId, h: HalfedgeId, forward: bool) {
         let mesh = &self.mesh;
         let after = mesh.vertex_halfedge(node);
         let before = mesh.incoming_boundary(node);
-        // From the triangle before the node clockwise around it to the one after it.
+        // Clockwise around the node, from the triangle of the boundary edge before it to that of the edge after it.
         let fan = Fan { corner: before, first: mesh.next(before), counter_clockwise: false };
-        let turns: i32 = fan.crossed(mesh, after).into_iter().map(|h| self.jump_across(h)).sum();
+        let turns = self.turns_along(&fan.crossed(mesh, after));
         let behind = if forward {
             self.boundary.get(&before).map(|&(k, arc)| (i32::from(k) - turns, arc))
         } else {
@@ -110,18 +111,18 @@ impl EmbeddingTopology {
     }
 }
 
-fn drag_start(mesh: &TriMesh, jump: &[i32], arc: &mut TopologyArc, fan: &Fan) {
+/// Lets an arc start at the corner of the fan and run through the fan to its former start.
+fn prepend_fan(mesh: &TriMesh, jump: &[i32], arc: &mut TopologyArc, fan: &Fan) {
     let mut crossed = fan.crossed(mesh, arc.start);
-    let turns: i32 =
-        crossed.iter().map(|&h| crate::embed::topology::embedding_topology::jump_across(mesh, jump, h)).sum();
+    let turns = turns_along(mesh, jump, &crossed);
     crossed.append(&mut arc.crossed);
     arc.crossed = crossed;
     arc.start = fan.corner;
     arc.heading = (i32::from(arc.heading) + turns).rem_euclid(4) as u8;
 }
 
-/// Removes steps that are taken back at once.
-fn cancel(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
+/// Removes pairs of crossings of which the second takes back the first.
+fn cancel_backtracking(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
     let mut kept: Vec<HalfedgeId> = Vec::with_capacity(crossed.len());
     for &h in crossed.iter() {
         if kept.last().is_some_and(|&l| mesh.twin(l) == Some(h)) {
@@ -135,48 +136,67 @@ fn cancel(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
 
 #[cfg(test)]
 mod tests {
-    use crate::embed::topology::testing::{indices, is_chain, net};
+    use proptest::prelude::*;
+
+    use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc, node_indices};
+    use crate::embed::topology::testing::{indices, is_chain, net, torus_topology};
     use crate::mesh::HalfedgeId;
 
-    #[test]
-    fn a_node_takes_its_index_and_its_arcs_along() {
-        let mut net = net();
-        let before = indices(&net.mesh, &net.jump);
-        for step in 0..40usize {
-            let node = 0;
-            let v = net.nodes[node].vertex;
-            let spokes: Vec<HalfedgeId> = net.mesh.outgoing(v).collect();
-            let h = spokes[(step * 7 + step / 3) % spokes.len()];
-            let w = net.mesh.target(h);
-            if net.nodes.iter().any(|n| n.vertex == w) {
-                continue;
-            }
-            let old = indices(&net.mesh, &net.jump);
-            net.move_node(node, h);
-            let new = indices(&net.mesh, &net.jump);
-            assert_eq!(new[w.index()], old[w.index()] + 1);
-            assert_eq!(new[v.index()], old[v.index()] - 1);
-            assert_eq!(new.iter().sum::<i32>(), before.iter().sum::<i32>());
-            assert!((0..net.arcs.len()).all(|a| is_chain(&net, a)));
+    /// Moves a node along one of the half-edges that leave it, unless another node is at the other end.
+    fn try_move(topology: &mut EmbeddingTopology, node: usize, choice: usize) {
+        let spokes: Vec<HalfedgeId> = topology.mesh.outgoing(topology.nodes[node].vertex).collect();
+        let h = spokes[choice % spokes.len()];
+        let target = topology.mesh.target(h);
+        if topology.nodes.iter().all(|n| n.vertex != target) {
+            topology.move_node(node, h);
         }
     }
 
     #[test]
-    fn there_and_back_changes_nothing() {
-        let mut net = net();
-        let before = net.clone();
-        let h = net.mesh.outgoing(net.nodes[0].vertex).nth(2).unwrap();
-        net.move_node(0, h);
-        net.move_node(0, net.mesh.twin(h).unwrap());
-        assert_eq!((&net.jump, &net.nodes), (&before.jump, &before.nodes));
-        for (a, b) in net.arcs.iter().zip(&before.arcs) {
-            // A chain may start in another triangle of the node; what it says of the end is the same.
-            let end = |net: &crate::embed::EmbeddingTopology, arc: &crate::embed::TopologyArc| {
-                let turns: i32 = arc.crossed.iter().map(|&h| net.jump_across(h)).sum();
-                (i32::from(arc.heading) - turns).rem_euclid(4)
+    fn moving_a_node_moves_its_index_and_keeps_arcs_chains() {
+        let mut topology = net();
+        for step in 0..40usize {
+            try_move(&mut topology, 0, step * 7 + step / 3);
+            assert_eq!(indices(&topology.mesh, &topology.jump), node_indices(&topology.mesh, &topology.nodes));
+            assert!((0..topology.arcs.len()).all(|a| is_chain(&topology, a)));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn random_moves_keep_every_vertex_index_and_chain(
+            cells in [6u32..14, 6u32..14],
+            gaps in [2u32..4, 2u32..4],
+            moves in prop::collection::vec((0usize..4, 0usize..64), 1..24),
+        ) {
+            let mut topology = torus_topology(cells, [1, 1 + gaps[1]], [0, gaps[0]]);
+            for (node, choice) in moves {
+                try_move(&mut topology, node, choice);
+                let index = indices(&topology.mesh, &topology.jump);
+                prop_assert_eq!(index.iter().sum::<i32>(), 0, "Poincaré–Hopf on a torus");
+                prop_assert_eq!(index, node_indices(&topology.mesh, &topology.nodes));
+                prop_assert!((0..topology.arcs.len()).all(|a| is_chain(&topology, a)));
+            }
+        }
+    }
+
+    #[test]
+    fn moving_a_node_back_restores_jumps_and_headings() {
+        let mut topology = net();
+        let before = topology.clone();
+        let h = topology.mesh.outgoing(topology.nodes[0].vertex).nth(2).unwrap();
+        topology.move_node(0, h);
+        topology.move_node(0, topology.mesh.twin(h).unwrap());
+        assert_eq!((&topology.jump, &topology.nodes), (&before.jump, &before.nodes));
+        for (a, b) in topology.arcs.iter().zip(&before.arcs) {
+            // A chain may start in another triangle of the node; its heading in the last triangle is the same.
+            let last_heading = |t: &EmbeddingTopology, arc: &TopologyArc| {
+                (i32::from(arc.heading) - t.turns_along(&arc.crossed)).rem_euclid(4)
             };
-            if net.mesh.face(a.end) == before.mesh.face(b.end) {
-                assert_eq!(end(&net, a), end(&before, b));
+            if topology.mesh.face(a.end) == before.mesh.face(b.end) {
+                assert_eq!(last_heading(&topology, a), last_heading(&before, b));
             }
         }
     }

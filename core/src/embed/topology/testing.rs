@@ -1,75 +1,56 @@
-//! A net for tests of what is done to nets.
-
-use std::collections::VecDeque;
+//! A topology on a torus, and checks, for tests of operations on topologies.
 
 use crate::dual::Arrangement;
 use crate::embed::EmbeddingTopology;
 use crate::embed::arc_headings;
-use crate::embed::topology::period_jumps::vertex_index;
+use crate::embed::topology::period_jumps::{fewest_edges, move_index, vertex_index};
 use crate::layout::{QuadLayout, embed};
-use crate::mesh::{HalfedgeId, TriMesh, VertexId};
+use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::Metric;
 use crate::testing::{column, row, torus};
 
-/// A layout of two by two patches on a torus, whose first node is given the index of a node of valence 3 and whose
-/// second that of one of valence 5, with jumps along edges from one to the other.
+/// A layout of two by two patches on a torus of 24 × 12 cells; see [`torus_topology`].
 pub fn net() -> EmbeddingTopology {
-    let mesh = torus(24, 12);
-    let mut curves = vec![row(24, 1, true, 0.4), row(24, 7, true, 0.4)];
-    curves.extend([3, 14].map(|i| column(24, 12, i, true, 0.6)));
+    torus_topology([24, 12], [1, 7], [3, 14])
+}
+
+/// A layout of two by two patches on a torus of `cells`, between the given rows and columns of cells. Its first node is
+/// given valence 3 and its second valence 5, and the jumps along an edge path between them are changed accordingly.
+pub fn torus_topology(cells: [u32; 2], rows: [u32; 2], columns: [u32; 2]) -> EmbeddingTopology {
+    let [n, m] = cells;
+    let mesh = torus(n, m);
+    let mut curves: Vec<_> = rows.map(|j| row(n, j, true, 0.4)).into();
+    curves.extend(columns.map(|i| column(n, m, i, true, 0.6)));
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-    let initial_embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
-    let mut net = EmbeddingTopology::new(&mesh, &initial_embedding, &layout, &arc_headings(&layout)).unwrap();
+    let initial = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+    let mut topology = EmbeddingTopology::new(&mesh, &initial, &layout, &arc_headings(&layout)).unwrap();
     for (node, valence) in [(0, 3), (1, 5)] {
-        net.nodes[node].valence = valence;
+        topology.nodes[node].valence = valence;
     }
-    for h in path(&net.mesh, net.nodes[0].vertex, net.nodes[1].vertex) {
-        let edge = net.mesh.edge(h);
-        net.jump[edge.index()] += if net.mesh.halfedge(edge) == h { 1 } else { -1 };
+    let [from, to] = [0, 1].map(|node: usize| topology.nodes[node].vertex);
+    for h in fewest_edges(&topology.mesh, from, |v| v == to).unwrap() {
+        move_index(&topology.mesh, &mut topology.jump, h, -1);
     }
-    net
+    topology
 }
 
-/// Half-edges from one vertex to another, on a surface without boundary.
-fn path(mesh: &TriMesh, from: VertexId, to: VertexId) -> Vec<HalfedgeId> {
-    let mut by: Vec<Option<HalfedgeId>> = vec![None; mesh.n_vertices()];
-    let mut queue = VecDeque::from([from]);
-    while let Some(v) = queue.pop_front() {
-        for h in mesh.outgoing(v).filter(|&h| mesh.target(h) != from) {
-            if by[mesh.target(h).index()].is_none() {
-                by[mesh.target(h).index()] = Some(h);
-                queue.push_back(mesh.target(h));
-            }
-        }
-    }
-    let mut out = Vec::new();
-    let mut at = to;
-    while at != from {
-        let h = by[at.index()].unwrap();
-        out.push(h);
-        at = mesh.origin(h);
-    }
-    out.reverse();
-    out
-}
-
-/// The index of every vertex, in quarters.
+/// The index of every vertex of a closed mesh, in quarter turns.
 pub fn indices(mesh: &TriMesh, jump: &[i32]) -> Vec<i32> {
     let metric = Metric::new(mesh);
     mesh.vertices().map(|v| vertex_index(mesh, &metric, jump, v)).collect()
 }
 
-/// Whether the chain of an arc leads without a gap from its first node to its last.
-pub fn is_chain(net: &EmbeddingTopology, arc: usize) -> bool {
-    let a = &net.arcs[arc];
-    let mut face = net.mesh.face(a.start);
+/// Whether the chain of an arc is connected and joins the arc's nodes.
+pub fn is_chain(topology: &EmbeddingTopology, arc: usize) -> bool {
+    let a = &topology.arcs[arc];
+    let mut face = topology.mesh.face(a.start);
     let joined = a.crossed.iter().all(|&h| {
-        let here = net.mesh.face(h) == face;
-        face = net.mesh.face(net.mesh.twin(h).unwrap());
+        let here = topology.mesh.face(h) == face;
+        face = topology.mesh.face(topology.mesh.twin(h).unwrap());
         here
     });
-    let ends = [a.start, a.end].map(|h| net.mesh.origin(h));
-    joined && face == net.mesh.face(a.end) && ends == a.nodes.map(|n| net.nodes[n as usize].vertex)
+    let ends = [a.start, a.end].map(|h| topology.mesh.origin(h));
+    joined && face == topology.mesh.face(a.end) && ends == a.nodes.map(|n| topology.nodes[n as usize].vertex)
 }

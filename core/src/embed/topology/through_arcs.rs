@@ -1,47 +1,52 @@
-//! Straight chains of arcs through regular nodes (Campen, section 6.9).
+//! Through-arcs: chains of opposite arcs through regular nodes (Campen, section 6.9).
 //!
-//! Four patches meet at a regular node, and two isolines cross there. Nothing singles it out but these: it need not be
-//! held. Its four arcs are joined to two, so that only chains from irregular node to irregular node are asked to be
-//! isolines, and its place follows as their crossing. A chain that closes on itself asks just for that.
+//! A regular node is the crossing of two isolines and need not be constrained itself. Its four arcs are joined to two
+//! opposite pairs, so that only chains from one irregular node to another must be isolines; the position of a regular
+//! node follows as the crossing of its two chains. A chain that closes on itself must be a closed isoline.
+//!
+//! The position of a node on the chain may come out in another order than in the layout: the structure has to be
+//! verified afterwards.
 
+use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
 use crate::layout::QuadLayout;
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::surface::SurfacePoint;
 
-use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc, jump_across};
-
-/// An end of an arc: at its first node or at its second.
+/// A half-arc: an arc, and whether the half-arc starts at its second node rather than at its first.
 pub(in crate::embed) type HalfArc = (u32, bool);
 
-/// Opposite ends at regular nodes.
+/// The half-arcs around each node, and which of them are joined through regular nodes.
 #[derive(Debug, Clone)]
 pub(in crate::embed) struct ThroughArcs {
-    /// For each end of an arc (first, second) the next one counter-clockwise around the node.
+    /// For each half-arc the next one counter-clockwise around its node; `None` at the boundary.
     next: Vec<[Option<HalfArc>; 2]>,
-    /// For each end of an arc the end that goes straight on.
+    /// For each half-arc the opposite one at its node; `None` where chains end.
     opposite: Vec<[Option<HalfArc>; 2]>,
-    /// For each node whether it is held to its arcs.
+    /// For each node whether its arcs are constrained to end in it.
     pub constrained: Vec<bool>,
 }
 
-/// A chain of triangles from corner to corner.
+/// A chain of triangles between corners of its first and its last triangle.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::embed) struct TriangleChain {
+    /// The first corner, as outgoing half-edge.
     pub start: HalfedgeId,
+    /// The half-edges crossed, each of the triangle that is left.
     pub crossed: Vec<HalfedgeId>,
+    /// The last corner, as outgoing half-edge.
     pub end: HalfedgeId,
-    /// Direction of the first triangle's cross along which it runs.
+    /// The direction (0 to 3) of the first triangle's cross in which it runs.
     pub heading: u8,
 }
 
 impl ThroughArcs {
-    /// The crossroads of a layout: regular nodes inside the surface that are not `pinned`. On the boundary a regular node
-    /// holds nothing, for every isoline that ends there does so at a right angle.
+    /// Joins the arcs at all regular nodes of a layout inside the surface that are not `pinned`. At a regular node on
+    /// the boundary chains end without a constraint, for every isoline that ends there does so at a right angle.
     pub(in crate::embed) fn new(layout: &QuadLayout, pinned: impl Fn(usize) -> bool) -> Self {
         let mut next: Vec<[Option<HalfArc>; 2]> = vec![[None; 2]; layout.arcs.len()];
         for p in &layout.patches {
             for i in 0..4 {
-                // Counter-clockwise at corner `i` comes after the side that leaves it the one that ends there.
+                // Counter-clockwise at corner `i`, the side that arrives there follows the side that leaves.
                 let (out, forward) = p.sides[i];
                 let (into, came) = p.sides[(i + 3) % 4];
                 next[out as usize][usize::from(!forward)] = Some((into, came));
@@ -49,7 +54,7 @@ impl ThroughArcs {
         }
         let constrained: Vec<bool> =
             layout.nodes.iter().enumerate().map(|(i, n)| !n.is_regular() || pinned(i)).collect();
-        let straight = |a: usize, second: bool| {
+        let opposite_end = |a: usize, second: bool| {
             let node = layout.arcs[a].nodes[usize::from(second)] as usize;
             if constrained[node] || layout.nodes[node].boundary {
                 return None;
@@ -57,32 +62,34 @@ impl ThroughArcs {
             let (b, e) = next[a][usize::from(second)]?;
             next[b as usize][usize::from(e)]
         };
-        let opposite = (0..layout.arcs.len()).map(|a| [false, true].map(|e| straight(a, e))).collect();
+        let opposite = (0..layout.arcs.len()).map(|a| [false, true].map(|e| opposite_end(a, e))).collect();
         Self { next, opposite, constrained }
     }
 
-    /// The chains that must be isolines, each once; a closed one ends at the corner it starts at.
-    pub(in crate::embed) fn chains(&self, net: &EmbeddingTopology) -> Vec<TriangleChain> {
-        let mut done = vec![false; net.arcs.len()];
+    /// The chains that must be isolines, each once: from one constrained node to another, or closed. A closed one ends
+    /// at the corner it starts at.
+    pub(in crate::embed) fn chains(&self, topology: &EmbeddingTopology) -> Vec<TriangleChain> {
+        let mut done = vec![false; topology.arcs.len()];
         let mut chains = Vec::new();
-        // From ends that do not go on first; what is left then are closed chains.
-        let ends = (0..net.arcs.len() as u32).flat_map(|a| [(a, false), (a, true)]);
+        // First from half-arcs without an opposite one, where chains begin; the arcs left after that are in closed
+        // chains.
+        let ends = (0..topology.arcs.len() as u32).flat_map(|a| [(a, false), (a, true)]);
         let open = |&(a, e): &HalfArc| self.opposite[a as usize][usize::from(e)].is_none();
         for first in ends.clone().filter(open).chain(ends) {
-            if done[first.0 as usize] || net.arcs[first.0 as usize].boundary {
+            if done[first.0 as usize] || topology.arcs[first.0 as usize].boundary {
                 continue;
             }
             let (list, closed) = self.walk(first);
             for &(a, _) in &list {
                 done[a as usize] = true;
             }
-            let node = |(a, e): HalfArc| net.arcs[a as usize].nodes[usize::from(e)] as usize;
+            let node = |(a, e): HalfArc| topology.arcs[a as usize].nodes[usize::from(e)] as usize;
             let (Some(&head), Some(&tail)) = (list.first(), list.last()) else { continue };
             let far = (tail.0, !tail.1);
             if closed || (self.constrained[node(head)] && self.constrained[node(far)]) {
-                chains.extend(join(net, &list).and_then(|mut c| {
+                chains.extend(join(topology, &list).and_then(|mut c| {
                     if closed {
-                        c.crossed.extend(around(&net.mesh, c.end, c.start)?);
+                        c.crossed.extend(around(&topology.mesh, c.end, c.start)?);
                         c.end = c.start;
                     }
                     Some(c)
@@ -92,11 +99,12 @@ impl ThroughArcs {
         chains
     }
 
-    /// From an end of an arc straight on to the next node that holds; each arc by the end it is entered through.
+    /// The half-arcs from `first` on to the end of the chain, and whether it is closed.
     fn walk(&self, first: HalfArc) -> (Vec<HalfArc>, bool) {
         let mut list = vec![first];
         let mut at = first;
         while let Some(on) = self.opposite[at.0 as usize][usize::from(!at.1)] {
+            // The bound on the length only matters for inconsistent layouts, where a chain need not return to `first`.
             if on == first || list.len() > 2 * self.opposite.len() {
                 return (list, true);
             }
@@ -106,51 +114,59 @@ impl ThroughArcs {
         (list, false)
     }
 
-    /// From the end of an arc straight on: the chains to all nodes on the way up to the first that is held, or until
-    /// the way ends or closes.
-    pub(in crate::embed) fn continuations(&self, net: &EmbeddingTopology, end: HalfArc) -> Vec<(TriangleChain, usize)> {
+    /// The chains from the start of a half-arc to each node on its through-arc, with these nodes, up to the end of the
+    /// through-arc or once around it.
+    pub(in crate::embed) fn continuations(
+        &self,
+        topology: &EmbeddingTopology,
+        end: HalfArc,
+    ) -> Vec<(TriangleChain, usize)> {
         let (list, _) = self.walk(end);
         let mut continuations: Vec<(TriangleChain, usize)> = Vec::new();
         for &at in &list {
             let next = match continuations.last() {
-                None => Some(directed(net, at)),
-                Some((before, _)) => extend(net, before.clone(), at),
+                None => Some(half_arc_chain(topology, at)),
+                Some((before, _)) => extend(topology, before.clone(), at),
             };
             let Some(chain) = next else { break };
-            continuations.push((chain, net.arcs[at.0 as usize].nodes[usize::from(!at.1)] as usize));
+            continuations.push((chain, topology.arcs[at.0 as usize].nodes[usize::from(!at.1)] as usize));
         }
         continuations
     }
 
-    /// An arc with what tells its length in the map: from a held node on the isoline across its first end to one on the
-    /// isoline across its second. The heading is that of the arc. `None` if an isoline has no held node.
-    pub(in crate::embed) fn length_chain(&self, net: &EmbeddingTopology, a: u32) -> Option<TriangleChain> {
-        let mut list: Vec<HalfArc> = self.sideways(net, (a, false))?;
+    /// The chain that gives the length of an arc in the map even where its nodes are not constrained: from a
+    /// constrained node on the isoline that crosses its first node, along the arc, to a constrained node on the isoline
+    /// that crosses its second. The heading is that of the arc in the chain's first triangle. `None` if there is no
+    /// such node.
+    pub(in crate::embed) fn length_chain(&self, topology: &EmbeddingTopology, a: u32) -> Option<TriangleChain> {
+        let mut list: Vec<HalfArc> = self.crossing_separatrix(topology, (a, false))?;
         list.reverse();
         for end in &mut list {
             end.1 = !end.1;
         }
-        let before = join(net, &list);
+        let before = join(topology, &list);
         list.push((a, false));
-        list.extend(self.sideways(net, (a, true))?);
-        let whole = join(net, &list)?;
-        let arc = &net.arcs[a as usize];
+        list.extend(self.crossing_separatrix(topology, (a, true))?);
+        let whole = join(topology, &list)?;
+        let arc = &topology.arcs[a as usize];
         let mut crossed: Vec<HalfedgeId> = Vec::new();
         if let Some(before) = before {
             crossed.extend(before.crossed);
-            crossed.extend(around(&net.mesh, before.end, arc.start)?);
+            crossed.extend(around(&topology.mesh, before.end, arc.start)?);
         }
-        let turns: i32 = crossed.iter().map(|&h| jump_across(&net.mesh, &net.jump, h)).sum();
+        let turns = topology.turns_along(&crossed);
         Some(TriangleChain { heading: (i32::from(arc.heading) + turns).rem_euclid(4) as u8, ..whole })
     }
 
-    /// From the node at an end of an arc across the arc to a held node: none if it is held itself.
-    fn sideways(&self, net: &EmbeddingTopology, end: HalfArc) -> Option<Vec<HalfArc>> {
-        let node = |(a, e): HalfArc| net.arcs[a as usize].nodes[usize::from(e)] as usize;
+    /// The half-arcs from the node of a half-arc, across it, to a constrained node; empty if the node itself is
+    /// constrained.
+    fn crossing_separatrix(&self, topology: &EmbeddingTopology, end: HalfArc) -> Option<Vec<HalfArc>> {
+        let node = |(a, e): HalfArc| topology.arcs[a as usize].nodes[usize::from(e)] as usize;
         if self.constrained[node(end)] {
             return Some(Vec::new());
         }
         let mut at = end;
+        // The other three half-arcs of a regular node; the opposite one does not cross.
         for _ in 0..3 {
             at = self.next[at.0 as usize][usize::from(at.1)]?;
             let (list, closed) = self.walk(at);
@@ -163,28 +179,29 @@ impl ThroughArcs {
         None
     }
 
-    /// The corner of the end of an arc.
-    pub(in crate::embed) fn corner(&self, net: &EmbeddingTopology, (a, second): HalfArc) -> HalfedgeId {
-        let arc = &net.arcs[a as usize];
+    /// The corner at which a half-arc starts.
+    pub(in crate::embed) fn corner(&self, topology: &EmbeddingTopology, (a, second): HalfArc) -> HalfedgeId {
+        let arc = &topology.arcs[a as usize];
         if second { arc.end } else { arc.start }
     }
 
-    /// Holds all nodes to their arcs.
+    /// Constrains the arcs of all nodes to end in them, so that no arcs are joined.
     pub(in crate::embed) fn constrain_all(&mut self) {
         self.constrained.fill(true);
         self.opposite.fill([None; 2]);
     }
 }
 
-/// The arc from the end given to the other.
-fn directed(net: &EmbeddingTopology, (a, second): HalfArc) -> TriangleChain {
-    let TopologyArc { start, crossed, end, heading, .. } = &net.arcs[a as usize];
+/// The chain of a half-arc.
+fn half_arc_chain(topology: &EmbeddingTopology, (a, second): HalfArc) -> TriangleChain {
+    let TopologyArc { start, crossed, end, heading, .. } = &topology.arcs[a as usize];
     if !second {
         return TriangleChain { start: *start, crossed: crossed.clone(), end: *end, heading: *heading };
     }
-    // Seen from the last triangle the arc comes along its heading there, and goes back against it.
-    let turns: i32 = crossed.iter().map(|&h| jump_across(&net.mesh, &net.jump, h)).sum();
-    let back = crossed.iter().rev().filter_map(|&h| net.mesh.twin(h)).collect();
+    // In the frame of the last triangle the arc arrives with heading `heading − turns`, and leaves it in the opposite
+    // one.
+    let turns = topology.turns_along(crossed);
+    let back = crossed.iter().rev().filter_map(|&h| topology.mesh.twin(h)).collect();
     TriangleChain {
         start: *end,
         crossed: back,
@@ -193,23 +210,23 @@ fn directed(net: &EmbeddingTopology, (a, second): HalfArc) -> TriangleChain {
     }
 }
 
-/// The arcs given by the ends they are entered through, as one chain.
-fn join(net: &EmbeddingTopology, list: &[HalfArc]) -> Option<TriangleChain> {
+/// The chain of half-arcs one after the other.
+fn join(topology: &EmbeddingTopology, list: &[HalfArc]) -> Option<TriangleChain> {
     let (&first, rest) = list.split_first()?;
-    rest.iter().try_fold(directed(net, first), |chain, &at| extend(net, chain, at))
+    rest.iter().try_fold(half_arc_chain(topology, first), |chain, &at| extend(topology, chain, at))
 }
 
-/// A chain and the arc that goes on from it.
-fn extend(net: &EmbeddingTopology, mut chain: TriangleChain, at: HalfArc) -> Option<TriangleChain> {
-    let part = directed(net, at);
-    chain.crossed.extend(around(&net.mesh, chain.end, part.start)?);
+/// A chain continued by a half-arc that starts at its end.
+fn extend(topology: &EmbeddingTopology, mut chain: TriangleChain, at: HalfArc) -> Option<TriangleChain> {
+    let part = half_arc_chain(topology, at);
+    chain.crossed.extend(around(&topology.mesh, chain.end, part.start)?);
     chain.crossed.extend(part.crossed);
     chain.end = part.end;
     Some(chain)
 }
 
-/// The half-edges crossed from the triangle of one corner to that of another at the same vertex, which is regular, so
-/// that any way around will do.
+/// The half-edges crossed counter-clockwise around a vertex from the triangle of one corner to that of another; `None`
+/// at the boundary. At a regular vertex the other way around is homotopic.
 pub(in crate::embed) fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<HalfedgeId>> {
     let mut crossed = Vec::new();
     let mut at = from;
@@ -228,5 +245,5 @@ pub(in crate::embed) fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId)
 pub(in crate::embed) fn corner_point(h: HalfedgeId) -> SurfacePoint {
     let mut weights = [0.0; 3];
     weights[h.index() % 3] = 1.0;
-    SurfacePoint { face: crate::mesh::FaceId::new(h.index() / 3), weights }
+    SurfacePoint { face: FaceId::new(h.index() / 3), weights }
 }

@@ -1,50 +1,52 @@
-//! The layout that a map has by itself: its base complex.
+//! Completion: the layout that a map determines, its base complex (Campen, section 6.5.2).
 //!
-//! All isolines that leave the irregular nodes are followed to a node or the boundary. Where they cross one another
-//! there are regular nodes, and together with the boundary they part the surface into rectangles (Campen, section
-//! 6.5.2: arcs of a partial layout that are not given emerge from the map). Given all nodes of a complete
-//! layout, the result is that layout if, and only if, the map realises it.
+//! All isolines that leave the given nodes are traced to a node or to the boundary. Where they cross, or end on the
+//! boundary, there are regular nodes, and together with the boundary they cut the surface into rectangles. So the
+//! missing arcs of a partial layout are read off the map. For all nodes of a complete layout the result is that layout
+//! if and only if the map realises it.
 
 use thiserror::Error;
 
 use crate::dual::{Mark, RefinedMesh, next};
-use crate::embed::trace::arcs::{TraceError, TracedLayout, misplaced, parameters, points, seeds, straighten};
-use crate::embed::trace::isolines::{Exit, Isolines, Slot, Step, Stop, exactness, nodes_at};
-use crate::embed::trace::overlay::{Meeting, Point, overlay};
-use crate::layout::{Arc, Embedding, LayoutError, Node, Patch, QuadLayout};
+use crate::embed::trace::error::TraceError;
+use crate::embed::trace::isoline_points::{Point, degenerate_crossing, isoline_points, snap_vertices};
+use crate::embed::trace::isolines::{Exit, Isolines, OutgoingIsoline, Step, Stop, map_rounding, nodes_at};
+use crate::embed::trace::overlay::{Meeting, overlay};
+use crate::embed::trace::traced_layout::TracedLayout;
+use crate::layout::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 
 /// Why a map has no base complex.
 #[derive(Debug, Error)]
 pub enum CompletionError {
-    /// An isoline comes to no node and not to the boundary within the length allowed.
-    #[error("an isoline from node {node} does not end")]
+    /// An isoline reaches neither a node nor the boundary within the length allowed.
+    #[error("an isoline from node {node} reaches neither a node nor the boundary")]
     Endless {
         /// The node.
         node: usize,
     },
-    /// The map is folded where an isoline runs.
-    #[error("an isoline from node {node} runs into a fold")]
-    Fold {
+    /// An isoline runs into a flipped triangle, or does not continue at a vertex.
+    #[error("an isoline from node {node} runs into a flipped triangle")]
+    FlippedTriangle {
         /// The node.
         node: usize,
     },
-    /// The isolines bound something that has not four sides.
-    #[error("beside arc {arc} lies no patch of four sides")]
+    /// A region between isolines does not have four sides.
+    #[error("the region beside arc {arc} does not have four sides")]
     Sides {
         /// The arc.
         arc: usize,
     },
-    /// The isolines do not fit on the surface.
+    /// The isolines could not be overlaid with the mesh.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The structure is no layout.
+    /// The structure is not that of a layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
 
-/// A layout with the embedding it was read off.
+/// A layout read off a map, with its embedding.
 #[derive(Debug, Clone)]
 pub struct CompletedLayout {
     /// The layout; the nodes given come first.
@@ -53,8 +55,8 @@ pub struct CompletedLayout {
     pub traced: TracedLayout,
 }
 
-/// The base complex of `map` with `nodes` for nodes, which must hold all its singular vertices and all corners of
-/// the boundary; isolines are followed for a length of `limit` in the map.
+/// The base complex of `map` for the given nodes, which must include all singular vertices of the map and all corners
+/// of the boundary. Isolines are traced for a length of at most `limit` in the map.
 ///
 /// # Errors
 ///
@@ -65,24 +67,22 @@ pub fn complete_layout(
     nodes: &[VertexId],
     limit: f64,
 ) -> Result<CompletedLayout, CompletionError> {
-    let (lines, exact) = separatrices(mesh, map, nodes, limit)?;
-    let welded = overlay(mesh, &exact, &lines, Meeting::Vertex)?;
-    let mut refined = welded.refined;
+    let (isolines, exact) = separatrices(mesh, map, nodes, limit)?;
+    let mut overlay = overlay(mesh, &exact, &isolines, Meeting::Vertex)?;
     let mut nodes: Vec<u32> = nodes.iter().map(|v| v.0).collect();
-    let is_node = find_nodes(&mut nodes, &welded.paths, welded.mesh.n_vertices());
-    let mut arcs = split(&welded.paths, &is_node);
-    arcs.extend(boundary_arcs(&welded.mesh, &is_node));
+    let node = add_regular_nodes(&mut nodes, &overlay.paths, overlay.mesh.n_vertices());
+    let mut arcs = split_at_nodes(&overlay.paths, &node);
+    arcs.extend(boundary_arcs(&overlay.mesh, &node));
     for (arc, path) in (0u32..).zip(&arcs) {
         for w in path.windows(2) {
-            let h = refined.find(w[0], w[1]).ok_or(CompletionError::Sides { arc: arc as usize })?;
-            refined.set_mark(h, Mark::Arc(arc));
+            let h = overlay.refined.find(w[0], w[1]).ok_or(CompletionError::Sides { arc: arc as usize })?;
+            overlay.refined.set_mark(h, Mark::Arc(arc));
         }
     }
-    let layout = structure(&refined, &welded.mesh, &nodes, &arcs)?;
-    let seeds = seeds(&layout, &welded.mesh, &arcs)?;
-    let arc_parameters = arcs.iter().map(|p| parameters(&welded.mesh, &welded.map, p)).collect();
-    let embedding = Embedding { mesh: refined, base_face: welded.base_face, nodes, arcs, arc_parameters, seeds };
-    Ok(CompletedLayout { layout, traced: TracedLayout { embedding, mesh: welded.mesh, map: welded.map } })
+    let graph = ArcGraph { refined: &overlay.refined, mesh: &overlay.mesh, node: &node, paths: &arcs };
+    let layout = graph.layout(&nodes)?;
+    let traced = TracedLayout::new(overlay, &layout, nodes, arcs)?;
+    Ok(CompletedLayout { layout, traced })
 }
 
 /// The isolines of all nodes, each once, and the map in which they are exact.
@@ -93,52 +93,56 @@ fn separatrices(
     limit: f64,
 ) -> Result<(Vec<Vec<Point>>, SeamlessMap), CompletionError> {
     let at = nodes_at(mesh, nodes);
-    let lines = Isolines { mesh, map, node: &at, exact: exactness(map), through_folds: false };
-    let slots: Vec<Vec<Slot>> = nodes.iter().map(|&v| lines.slots(v)).collect();
-    let mut done: Vec<Vec<bool>> = slots.iter().map(|s| s.iter().map(|s| on_boundary(mesh, s)).collect()).collect();
+    let isolines = Isolines { mesh, map, node: &at, rounding: map_rounding(map), cross_flipped: false };
+    let outgoing: Vec<Vec<OutgoingIsoline>> = nodes.iter().map(|&v| isolines.outgoing(v)).collect();
+    let mut done: Vec<Vec<bool>> =
+        outgoing.iter().map(|all| all.iter().map(|o| on_boundary(mesh, o)).collect()).collect();
     let mut exact = map.clone();
     let mut found = Vec::new();
     for node in 0..nodes.len() {
-        for (i, &slot) in slots[node].iter().enumerate() {
+        for (i, &isoline) in outgoing[node].iter().enumerate() {
             if done[node][i] {
                 continue;
             }
             let mut steps = Vec::new();
-            let outcome = lines.march_into(&mut steps, slot, limit);
+            let outcome = isolines.trace_into(&mut steps, isoline, limit);
             let inner = match outcome {
                 Ok(_) => {
                     let Some(Step::Vertex(end, _)) = steps.last() else { continue };
                     let to = at[mesh.origin(*end).index()] as usize;
-                    let arrival = lines.arrival(&steps, &slots[to]).ok_or(CompletionError::Fold { node })?;
-                    done[to][arrival] = true;
+                    let arrival = isolines.arrival(&steps, &outgoing[to]);
+                    // Traced from the other node, it would be the same isoline.
+                    done[to][arrival.ok_or(CompletionError::FlippedTriangle { node })?] = true;
                     &steps[1..steps.len() - 1]
                 }
                 Err(Stop::Boundary(_)) => &steps[1..],
                 Err(Stop::Vertex(v)) if mesh.is_boundary_vertex(v) => &steps[1..],
                 Err(Stop::Length(_)) => return Err(CompletionError::Endless { node }),
-                Err(Stop::Fold(_) | Stop::Vertex(_)) => return Err(CompletionError::Fold { node }),
+                Err(Stop::FlippedTriangle(_) | Stop::Vertex(_)) => {
+                    return Err(CompletionError::FlippedTriangle { node });
+                }
             };
-            straighten(&lines, &mut exact, inner);
+            snap_vertices(&isolines, &mut exact, inner);
             found.push(steps);
         }
     }
-    let lines = Isolines { map: &exact, ..lines };
-    let found: Vec<Vec<Point>> = found.iter().map(|steps| points(&lines, steps)).collect();
+    let isolines = Isolines { map: &exact, ..isolines };
+    let found: Vec<Vec<Point>> = found.iter().map(|steps| isoline_points(&isolines, steps)).collect();
     for (arc, points) in found.iter().enumerate() {
-        if let Some(face) = misplaced(mesh, points) {
+        if let Some(face) = degenerate_crossing(mesh, points) {
             return Err(TraceError::Lost { arc, face }.into());
         }
     }
     Ok((found, exact))
 }
 
-/// Whether a slot runs along the boundary.
-fn on_boundary(mesh: &TriMesh, slot: &Slot) -> bool {
-    slot.exit == Exit::Back || slot.exit == Exit::Along && mesh.twin(slot.corner).is_none()
+/// Whether an isoline runs along the boundary.
+fn on_boundary(mesh: &TriMesh, isoline: &OutgoingIsoline) -> bool {
+    isoline.exit == Exit::Back || isoline.exit == Exit::Along && mesh.twin(isoline.corner).is_none()
 }
 
-/// Adds the vertices where isolines meet or end to `nodes`; returns the node at each vertex, or `u32::MAX`.
-fn find_nodes(nodes: &mut Vec<u32>, paths: &[Vec<u32>], n_vertices: usize) -> Vec<u32> {
+/// Adds the vertices where isolines cross or end to `nodes`; returns the node at each vertex, or `u32::MAX`.
+fn add_regular_nodes(nodes: &mut Vec<u32>, paths: &[Vec<u32>], n_vertices: usize) -> Vec<u32> {
     let mut visits = vec![0; n_vertices];
     for path in paths {
         for (i, &v) in path.iter().enumerate() {
@@ -158,8 +162,8 @@ fn find_nodes(nodes: &mut Vec<u32>, paths: &[Vec<u32>], n_vertices: usize) -> Ve
     node
 }
 
-/// The paths cut at nodes.
-fn split(paths: &[Vec<u32>], node: &[u32]) -> Vec<Vec<u32>> {
+/// The paths, split at nodes.
+fn split_at_nodes(paths: &[Vec<u32>], node: &[u32]) -> Vec<Vec<u32>> {
     let mut arcs = Vec::new();
     for path in paths {
         let mut from = 0;
@@ -173,7 +177,7 @@ fn split(paths: &[Vec<u32>], node: &[u32]) -> Vec<Vec<u32>> {
     arcs
 }
 
-/// The stretches of the boundary from node to node.
+/// The edge paths along the boundary from node to node.
 fn boundary_arcs(mesh: &TriMesh, node: &[u32]) -> Vec<Vec<u32>> {
     let mut arcs = Vec::new();
     for first in mesh.halfedges() {
@@ -195,73 +199,95 @@ fn boundary_arcs(mesh: &TriMesh, node: &[u32]) -> Vec<Vec<u32>> {
     arcs
 }
 
-/// The structure of arcs that are marked on a mesh.
-fn structure(
-    refined: &RefinedMesh,
-    mesh: &TriMesh,
-    nodes: &[u32],
-    paths: &[Vec<u32>],
-) -> Result<QuadLayout, CompletionError> {
-    let node = {
-        let vertices: Vec<VertexId> = nodes.iter().map(|&v| VertexId(v)).collect();
-        nodes_at(mesh, &vertices)
-    };
-    let leaving = |from: u32, to: u32| -> Option<HalfedgeId> {
-        mesh.outgoing(VertexId(from)).find(|&h| mesh.target(h) == VertexId(to))
-    };
-    let arcs: Vec<Arc> = paths
-        .iter()
-        .map(|p| Arc {
-            nodes: [p[0], p[p.len() - 1]].map(|v| node[v as usize]),
-            boundary: refined.find(p[0], p[1]).is_some_and(|h| refined.is_boundary(h)),
+/// A half-arc as a side of a patch: the arc, and whether it is run through forward.
+type Side = (usize, bool);
+
+/// Arcs that are edge paths of a mesh, marked on its edges.
+struct ArcGraph<'a> {
+    refined: &'a RefinedMesh,
+    mesh: &'a TriMesh,
+    /// The node at each vertex, or `u32::MAX`.
+    node: &'a [u32],
+    paths: &'a [Vec<u32>],
+}
+
+impl ArcGraph<'_> {
+    /// The structure of the layout whose nodes are the given vertices.
+    fn layout(&self, nodes: &[u32]) -> Result<QuadLayout, CompletionError> {
+        let arcs: Vec<Arc> = self.paths.iter().map(|p| self.arc(p)).collect();
+        let patches = self.patches(&arcs)?;
+        let mut nodes: Vec<Node> =
+            nodes.iter().map(|&v| Node { valence: 0, boundary: self.mesh.is_boundary_vertex(VertexId(v)) }).collect();
+        for corner in patches.iter().flat_map(|p| p.corners) {
+            nodes[corner as usize].valence += 1;
+        }
+        let mut layout = QuadLayout { nodes, arcs, patches, chords: 0 };
+        layout.find_chords();
+        layout.check(self.mesh.euler_characteristic())?;
+        Ok(layout)
+    }
+
+    fn arc(&self, path: &[u32]) -> Arc {
+        Arc {
+            nodes: [path[0], path[path.len() - 1]].map(|v| self.node[v as usize]),
+            boundary: self.refined.find(path[0], path[1]).is_some_and(|h| self.refined.is_boundary(h)),
             chord: 0,
-        })
-        .collect();
-    let mut used = vec![[false; 2]; arcs.len()];
-    let mut patches = Vec::new();
-    for first in (0..arcs.len()).flat_map(|a| [(a, true), (a, false)]) {
-        let ends = |(a, forward): (usize, bool)| {
-            let (p, n) = (&paths[a], paths[a].len());
-            if forward { ([p[0], p[1]], [p[n - 2], p[n - 1]]) } else { ([p[n - 1], p[n - 2]], [p[1], p[0]]) }
-        };
-        let outside = || arcs[first.0].boundary && leaving(ends(first).0[0], ends(first).0[1]).is_none();
-        if used[first.0][usize::from(first.1)] || outside() {
-            continue;
         }
-        let error = || CompletionError::Sides { arc: first.0 };
-        let mut sides = Vec::new();
-        let mut side = first;
-        loop {
-            used[side.0][usize::from(side.1)] = true;
-            sides.push(side);
-            let last = ends(side).1;
-            // Clockwise around the end through the faces on the left, to the next arc.
-            let mut h = next(leaving(last[0], last[1]).ok_or_else(error)?.0);
-            while refined.mark(h) == Mark::Free {
-                h = next(refined.twin(h).ok_or_else(error)?);
+    }
+
+    /// The patches: each half-arc that has the surface on its left is a side of one of them.
+    fn patches(&self, arcs: &[Arc]) -> Result<Vec<Patch>, CompletionError> {
+        let mut used = vec![[false; 2]; arcs.len()];
+        let mut patches = Vec::new();
+        for first in (0..arcs.len()).flat_map(|a| [(a, true), (a, false)]) {
+            let outside = || arcs[first.0].boundary && self.leaving(self.first_edge(first)).is_none();
+            if used[first.0][usize::from(first.1)] || outside() {
+                continue;
             }
-            let Mark::Arc(a) = refined.mark(h) else { return Err(error()) };
-            let way = [refined.origin(h), refined.target(h)];
-            side = (a as usize, ends((a as usize, true)).0 == way);
-            if side == first {
-                break;
+            let sides = self.sides(first).ok_or(CompletionError::Sides { arc: first.0 })?;
+            for (arc, forward) in sides {
+                used[arc][usize::from(forward)] = true;
             }
-            if sides.len() == 4 {
-                return Err(error());
+            let sides = sides.map(|(a, forward)| (a as u32, forward));
+            let corners = sides.map(|(a, forward)| arcs[a as usize].nodes[usize::from(!forward)]);
+            patches.push(Patch { corners, sides });
+        }
+        Ok(patches)
+    }
+
+    /// The four sides of the patch to the left of `first`; `None` if it does not have four.
+    fn sides(&self, first: Side) -> Option<[Side; 4]> {
+        let mut sides = [first; 4];
+        for i in 1..4 {
+            sides[i] = self.next_side(sides[i - 1])?;
+            if sides[i] == first {
+                return None;
             }
         }
-        let &[a, b, c, d] = sides.as_slice() else { return Err(error()) };
-        let sides = [a, b, c, d].map(|(a, forward)| (a as u32, forward));
-        let corners = sides.map(|(a, forward)| arcs[a as usize].nodes[usize::from(!forward)]);
-        patches.push(Patch { corners, sides });
+        (self.next_side(sides[3])? == first).then_some(sides)
     }
-    let mut nodes: Vec<Node> =
-        nodes.iter().map(|&v| Node { valence: 0, boundary: mesh.is_boundary_vertex(VertexId(v)) }).collect();
-    for corner in patches.iter().flat_map(|p| p.corners) {
-        nodes[corner as usize].valence += 1;
+
+    /// The side that follows a side counter-clockwise around the patch to its left.
+    fn next_side(&self, side: Side) -> Option<Side> {
+        // Clockwise around the end of the side, through the faces on its left, to the next arc.
+        let reversed = self.first_edge((side.0, !side.1));
+        let mut h = next(self.leaving([reversed[1], reversed[0]])?.0);
+        while self.refined.mark(h) == Mark::Free {
+            h = next(self.refined.twin(h)?);
+        }
+        let Mark::Arc(a) = self.refined.mark(h) else { return None };
+        let edge = [self.refined.origin(h), self.refined.target(h)];
+        Some((a as usize, self.first_edge((a as usize, true)) == edge))
     }
-    let mut layout = QuadLayout { nodes, arcs, patches, chords: 0 };
-    layout.find_chords();
-    layout.check(mesh.euler_characteristic())?;
-    Ok(layout)
+
+    /// The two vertices of the first edge of a side.
+    fn first_edge(&self, (a, forward): Side) -> [u32; 2] {
+        let (p, n) = (&self.paths[a], self.paths[a].len());
+        if forward { [p[0], p[1]] } else { [p[n - 1], p[n - 2]] }
+    }
+
+    /// The half-edge from one vertex to another, if there is one in the mesh.
+    fn leaving(&self, [from, to]: [u32; 2]) -> Option<HalfedgeId> {
+        self.mesh.outgoing(VertexId(from)).find(|&h| self.mesh.target(h) == VertexId(to))
+    }
 }

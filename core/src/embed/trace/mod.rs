@@ -1,17 +1,21 @@
-//! From a seamless map to arcs and patches: isolines are traced, matched with the arcs of the layout and overlaid with the
-//! mesh; patches are cut out as rectangles.
+//! From a seamless map to arcs and patches: isolines are traced, matched with the arcs of the layout and overlaid with
+//! the mesh; patches are cut out as rectangles.
 //!
 //! The room takes a mesh, a map and a layout. It does not know how the map was computed.
 
 pub(in crate::embed) mod arcs;
 pub(in crate::embed) mod completion;
-pub(in crate::embed) mod isolines;
-pub(in crate::embed) mod overlay;
+pub(in crate::embed) mod error;
+mod isoline_points;
+mod isolines;
+mod overlay;
 pub(in crate::embed) mod rectangles;
-pub(in crate::embed) mod separatrix_matching;
+mod separatrix_matching;
+mod traced_layout;
 
 #[cfg(test)]
-pub(in crate::embed) mod samples;
-
+mod samples;
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

@@ -1,48 +1,49 @@
-//! Patches of a traced layout as rectangles of the map (Campen, section 6.4.2).
+//! The patches of a traced layout as rectangles in the map (Campen, section 6.4.2).
 //!
-//! The charts of a patch's triangles are carried into that of one of them; the patch then is a rectangle whose sides
-//! are isolines. It is turned and moved so that its first corner is the origin and its first side runs along
-//! +u. Opposite sides of neighbours agree, as they share the arc.
+//! The charts of a patch's triangles are all transformed to that of one of them. The patch then is a rectangle whose
+//! sides are isolines; it is rotated and translated so that its first corner is the origin and its first side runs
+//! along +u. Neighbouring patches agree along their arc without scaling, as both take its length from the same map.
 
 use glam::DVec2;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::dual::Mark;
-use crate::embed::trace::arcs::TracedLayout;
+use crate::embed::trace::isolines::corner_uv;
+use crate::embed::trace::traced_layout::TracedLayout;
 use crate::layout::{ArcLookup, PatchMap, QuadLayout, Submesh, patch_faces, patch_sides};
-use crate::mesh::{TriMesh, TriMeshError};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, TriMeshError};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
 
-/// Deviation from a rectangle, relative to half its circumference, that is rounding.
+/// Largest deviation from a rectangle that counts as rounding, relative to half its circumference.
 const ROUNDING: f64 = 1e-9;
 
 /// Why the patches of a traced layout are not rectangles.
 #[derive(Debug, Error)]
 pub enum RectangleError {
-    /// A patch has not the sides that the layout says.
-    #[error("patch {patch} has not the four sides of the layout")]
+    /// The border of a patch does not consist of its four arcs.
+    #[error("the border of patch {patch} does not consist of its four arcs")]
     Sides {
         /// The patch.
         patch: usize,
     },
-    /// A patch is no disc.
+    /// The triangles of a patch are not a manifold.
     #[error("patch {patch} is not a disc: {source}")]
     NoDisc {
         /// The patch.
         patch: usize,
-        /// What the mesh kernel says.
+        /// Why not.
         source: TriMeshError,
     },
-    /// A patch is no rectangle in the map.
-    #[error("patch {patch} is off a rectangle of {size} by {deviation}")]
+    /// A patch is not a rectangle in the map.
+    #[error("patch {patch} deviates by {deviation} from a rectangle of size {size} in the map")]
     NotRectangle {
         /// The patch.
         patch: usize,
-        /// Width and height of the rectangle nearest to it.
+        /// Width and height of the rectangle compared with.
         size: DVec2,
-        /// How far some point is off.
+        /// The largest distance of a point from where it should be.
         deviation: f64,
     },
     /// Stopped from outside.
@@ -50,7 +51,7 @@ pub enum RectangleError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The patches of `layout` as the rectangles that the map makes of them.
+/// The maps of all patches of `layout` to rectangles, in the order of the patches.
 ///
 /// # Errors
 ///
@@ -79,56 +80,54 @@ fn map_rectangle(
     let embedding = &traced.embedding;
     let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
     let faces = patch_faces(&embedding.mesh, embedding.seeds[patch], on_arc);
-    let piece =
+    let submesh =
         Submesh::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| RectangleError::NoDisc { patch, source })?;
-    let sides = patch_sides(layout, lookup, &piece, patch).ok_or(RectangleError::Sides { patch })?;
-    if piece.mesh.euler_characteristic() != 1 {
+    let sides = patch_sides(layout, lookup, &submesh, patch).ok_or(RectangleError::Sides { patch })?;
+    if submesh.mesh.euler_characteristic() != 1 {
         return Err(RectangleError::Sides { patch });
     }
-    let (mut uv, torn) = one_chart(traced, &piece.mesh, &faces);
-    let (size, bent) = straighten(&mut uv, &sides);
-    let deviation = torn.max(bent);
+    let (mut uv, gap) = one_chart(traced, &submesh.mesh, &faces);
+    let (size, border_deviation) = align_to_rectangle(&mut uv, &sides);
+    let deviation = gap.max(border_deviation);
     if deviation.is_nan() || deviation > ROUNDING * (size.x + size.y) {
         return Err(RectangleError::NotRectangle { patch, size, deviation });
     }
-    let flipped = crate::layout::flipped(&piece.mesh, &uv);
+    let flipped = crate::layout::flipped(&submesh.mesh, &uv);
     let base_face = faces.iter().map(|&f| embedding.base_face[f as usize]).collect();
-    Ok(PatchMap { mesh: piece.mesh, whole: piece.whole, base_face, uv, size, flipped })
+    Ok(PatchMap { mesh: submesh.mesh, whole: submesh.whole, base_face, uv, size, flipped })
 }
 
-/// The coordinates of all vertices of a patch in the chart of its first triangle, and by how much the triangles
-/// at a vertex disagree at most. Face `k` of the patch is face `faces[k]` of the traced mesh.
+/// The coordinates of all vertices of a patch in the chart of its first triangle, and the largest distance between the
+/// coordinates of a vertex in different triangles. Face `k` of the patch is face `faces[k]` of the traced mesh.
 fn one_chart(traced: &TracedLayout, patch: &TriMesh, faces: &[u32]) -> (Vec<DVec2>, f64) {
-    let whole = |h: crate::mesh::HalfedgeId| crate::mesh::HalfedgeId(3 * faces[h.index() / 3] + h.0 % 3);
-    let mut chart: Vec<Option<Transition>> = vec![None; faces.len()];
+    let whole = |h: HalfedgeId| HalfedgeId(3 * faces[h.index() / 3] + h.0 % 3);
+    // The transition from the chart of each triangle to that of the first.
+    let mut to_first = vec![Transition::IDENTITY; faces.len()];
     let mut uv: Vec<Option<DVec2>> = vec![None; patch.n_vertices()];
-    let mut torn = 0.0f64;
-    let mut queue = std::collections::VecDeque::new();
-    chart[0] = Some(Transition::IDENTITY);
-    queue.push_back((0, Transition::IDENTITY));
-    while let Some((f, change)) = queue.pop_front() {
-        for h in patch.face_halfedges(crate::mesh::FaceId::new(f)) {
+    let mut gap = 0.0f64;
+    let mut search = BreadthFirst::new(faces.len());
+    search.start(FaceId(0));
+    while let Some(f) = search.visit() {
+        let change = to_first[f.index()];
+        for h in patch.face_halfedges(f) {
             let w = whole(h);
-            let at = change.apply(traced.map.uv[w.index() / 3][w.index() % 3]);
+            let at = change.apply(corner_uv(&traced.map, w));
             let known = *uv[patch.origin(h).index()].get_or_insert(at);
-            torn = torn.max(known.distance(at));
-            let Some(t) = patch.twin(h) else { continue };
-            let g = t.index() / 3;
-            if chart[g].is_none()
+            gap = gap.max(known.distance(at));
+            if let Some(t) = patch.twin(h)
                 && let Some(back) = traced.map.transition(&traced.mesh, whole(t))
+                && search.reach(patch.face(t), ())
             {
-                let next = back.then(&change);
-                chart[g] = Some(next);
-                queue.push_back((g, next));
+                to_first[patch.face(t).index()] = back.then(&change);
             }
         }
     }
-    (uv.into_iter().map(Option::unwrap_or_default).collect(), torn)
+    (uv.into_iter().map(Option::unwrap_or_default).collect(), gap)
 }
 
-/// Turns and moves a patch to its rectangle and puts its border exactly on the border of that; returns the size and by
-/// how much the border was off.
-fn straighten(uv: &mut [DVec2], sides: &[Vec<u32>; 4]) -> (DVec2, f64) {
+/// Rotates and translates a patch onto its rectangle and moves its border exactly onto the rectangle's; returns the
+/// size and the largest distance by which a point of the border moved.
+fn align_to_rectangle(uv: &mut [DVec2], sides: &[Vec<u32>; 4]) -> (DVec2, f64) {
     let corner = sides.each_ref().map(|s| s[0] as usize);
     let origin = uv[corner[0]];
     let along = uv[corner[1]] - origin;

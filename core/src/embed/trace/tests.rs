@@ -1,65 +1,21 @@
 use glam::{DVec2, DVec3};
+use proptest::prelude::*;
 
-use crate::embed::CompletedLayout;
-use crate::embed::RectangleError;
-use crate::embed::map_rectangles;
-use crate::embed::trace::arcs::{FlippedTriangles, TraceError, TracedLayout, preview_arcs, trace_arcs};
-use crate::embed::trace::completion::complete_layout;
+use crate::embed::trace::arcs::{FlippedTriangles, preview_arcs, trace_arcs};
+use crate::embed::trace::completion::CompletedLayout;
+use crate::embed::trace::error::TraceError;
+use crate::embed::trace::isolines::{Isolines, corner_uv, map_rounding, nodes_at};
+use crate::embed::trace::rectangles::{RectangleError, map_rectangles};
 use crate::embed::trace::samples::{self, Sample};
-use crate::layout::PatchMap;
+use crate::embed::trace::testing::{
+    area, completed, cycles, irregular, rectangles, sizes_are, trace, trace_rectangles,
+};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
-use crate::param::SeamlessMap;
+use crate::param::turn;
 use crate::progress::Progress;
-use crate::quad::{QuadMesh, Spacing, refine};
-
-fn trace(s: &Sample) -> Result<TracedLayout, TraceError> {
-    trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Refuse)
-}
-
-fn area(mesh: &TriMesh) -> f64 {
-    mesh.faces().map(|f| mesh.face_area(f)).sum()
-}
-
-/// Traces a sample and checks everything that holds for every layout in a map without folds.
-fn rectangles(s: &Sample) -> (TracedLayout, Vec<PatchMap>) {
-    let traced = trace(s).unwrap();
-    let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
-    assert!(maps.iter().all(|m| m.flipped == 0));
-    let whole = area(&s.mesh);
-    let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
-    assert!((parts - whole).abs() < 1e-9 * whole, "patches cover the surface once: {parts} of {whole}");
-    let smallest = traced.mesh.faces().map(|f| traced.mesh.face_area(f)).fold(f64::INFINITY, f64::min);
-    assert!(smallest > 1e-12, "no triangle without area: {smallest}");
-    for (arc, (path, along)) in traced.embedding.arcs.iter().zip(&traced.embedding.arc_parameters).enumerate() {
-        let ends = s.layout.arcs[arc].nodes.map(|n| s.nodes[n as usize].0);
-        assert_eq!([path[0], path[path.len() - 1]], ends);
-        assert!(along.windows(2).all(|w| w[0] < w[1]) && along.len() == path.len());
-    }
-    let lines = preview_arcs(&s.mesh, &s.map, &s.nodes, &s.chains());
-    for (line, path) in lines.iter().zip(&traced.embedding.arcs) {
-        let line = line.as_ref().unwrap();
-        let path: Vec<DVec3> = path.iter().map(|&v| traced.embedding.mesh.positions[v as usize]).collect();
-        let length = |p: &[DVec3]| p.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
-        assert!((length(line) - length(&path)).abs() < 1e-3 * length(&path));
-    }
-    let quads = refine(&s.layout, &traced.embedding, &maps, &Spacing::even(&s.layout, &vec![5; s.layout.chords]));
-    assert_eq!(euler(&quads), s.mesh.euler_characteristic());
-    (traced, maps)
-}
-
-fn euler(q: &QuadMesh) -> i64 {
-    let triangles: Vec<[u32; 3]> = q.quads.iter().flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]).collect();
-    TriMesh::from_faces(q.positions.clone(), &triangles).unwrap().euler_characteristic()
-}
-
-fn sizes_are(maps: &[PatchMap], size: DVec2) {
-    for m in maps {
-        assert!(m.size.distance(size) < 1e-12 || m.size.distance(DVec2::new(size.y, size.x)) < 1e-12, "{}", m.size);
-    }
-}
 
 #[test]
-fn a_square_with_its_boundary_is_one_patch() {
+fn a_square_is_one_patch() {
     for shake in [0.0, 0.3] {
         let s = samples::square(6, 1, shake);
         let (traced, maps) = rectangles(&s);
@@ -69,7 +25,7 @@ fn a_square_with_its_boundary_is_one_patch() {
 }
 
 #[test]
-fn arcs_inside_a_square_cross_triangles() {
+fn arcs_inside_a_square_are_straight() {
     for (n, k) in [(6, 2), (8, 2), (12, 3), (12, 4)] {
         for shake in [0.0, 1e-7, 1e-3, 0.3] {
             let s = samples::square(n, k, shake);
@@ -85,18 +41,7 @@ fn arcs_inside_a_square_cross_triangles() {
 }
 
 #[test]
-fn quads_continue_across_arcs_by_the_parameter() {
-    let s = samples::square(8, 2, 0.3);
-    let (traced, maps) = rectangles(&s);
-    let quads = refine(&s.layout, &traced.embedding, &maps, &Spacing::even(&s.layout, &vec![4; s.layout.chords]));
-    // The map is the identity: all vertices of the quads lie on a regular grid.
-    for p in &quads.positions {
-        assert!((*p * 8.0 - (*p * 8.0).round()).length() < 1e-9, "{p}");
-    }
-}
-
-#[test]
-fn slanted_arcs_close_up_on_a_torus() {
+fn slanted_arcs_on_a_torus_are_closed() {
     for n in [1, 2, 3, 4] {
         for shake in [0.0, 1e-7, 0.2, 0.3] {
             let (traced, maps) = rectangles(&samples::slanted_torus(n, shake));
@@ -107,20 +52,20 @@ fn slanted_arcs_close_up_on_a_torus() {
 }
 
 #[test]
-fn a_cube_has_its_sides_as_patches() {
+fn the_patches_of_a_cube_are_its_sides() {
     for (k, n) in [(1, 5), (2, 4), (2, 6)] {
         for shake in [0.0, 0.3] {
             let s = samples::cube(n, k, shake);
             let (traced, maps) = rectangles(&s);
             sizes_are(&maps, DVec2::splat(1.0 / f64::from(k)));
-            // Arcs on the edges of the cube are edges already.
+            // Arcs on the edges of the cube are edges of the mesh.
             assert_eq!(traced.mesh.n_vertices() == s.mesh.n_vertices(), k == 1 || shake == 0.0);
         }
     }
 }
 
 #[test]
-fn nodes_of_every_valence_have_their_patches() {
+fn nodes_of_all_valences_are_traced() {
     for k in [3, 5, 6, 8, 9] {
         for shake in [0.0, 0.25] {
             let (_, maps) = rectangles(&samples::cone(k, 4, shake));
@@ -130,11 +75,11 @@ fn nodes_of_every_valence_have_their_patches() {
 }
 
 #[test]
-fn a_common_first_triangle_is_enough_to_tell_arcs_of_a_node_apart() {
+fn arcs_of_a_node_may_all_start_in_one_triangle() {
     for k in [3, 5, 6, 8] {
         let mut s = samples::cone(k, 4, 0.2);
         let centre = s.nodes[0];
-        // Every chain is led around the centre to begin in the same triangle, the same way around.
+        // Every chain is extended around the centre to start in the same triangle, always counter-clockwise.
         let first = s.mesh.vertex_halfedge(centre);
         for (chain, arc) in s.chains.iter_mut().zip(&s.layout.arcs) {
             if arc.nodes[0] != 0 {
@@ -153,44 +98,38 @@ fn a_common_first_triangle_is_enough_to_tell_arcs_of_a_node_apart() {
             chain.start = first;
             chain.heading = (chain.heading + 4 - turns % 4) % 4;
         }
-        let (_, maps) = rectangles_without_preview(&s);
+        let (_, maps) = trace_rectangles(&s);
         sizes_are(&maps, DVec2::ONE);
     }
 }
 
-fn rectangles_without_preview(s: &Sample) -> (TracedLayout, Vec<PatchMap>) {
-    let traced = trace(s).unwrap();
-    let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
-    (traced, maps)
-}
-
 #[test]
-fn folds_are_errors_that_name_the_place() {
+fn flipped_triangles_are_errors_with_their_place() {
     let mut errors = 0;
     for v in 0..81 {
         let s = samples::square(8, 2, 0.2);
-        let v = crate::mesh::VertexId(v);
+        let v = VertexId(v);
         if s.mesh.is_boundary_vertex(v) {
             continue;
         }
-        let mut folded = s;
-        // Charts are turned, but a vertex put beside all of its ring is folded in any of them.
-        for h in folded.mesh.outgoing(v).collect::<Vec<_>>() {
-            let corner = &mut folded.map.uv[h.index() / 3];
+        let mut flipped = s;
+        // The vertex is moved out of its ring, which flips triangles whatever their charts.
+        for h in flipped.mesh.outgoing(v).collect::<Vec<_>>() {
+            let corner = &mut flipped.map.uv[h.index() / 3];
             let i = h.index() % 3;
             corner[i] = 2.0 * corner[(i + 1) % 3] - corner[i];
         }
-        match trace(&folded) {
+        match trace(&flipped) {
             Ok(_) => {}
             Err(e) => {
                 errors += 1;
                 assert!(
                     matches!(
                         e,
-                        TraceError::Fold { .. }
+                        TraceError::FlippedTriangle { .. }
                             | TraceError::Node { .. }
                             | TraceError::Lost { .. }
-                            | TraceError::Strayed { .. }
+                            | TraceError::WrongEnd { .. }
                             | TraceError::Length { .. }
                             | TraceError::Crossing { .. }
                     ),
@@ -198,35 +137,35 @@ fn folds_are_errors_that_name_the_place() {
                 );
             }
         }
-        preview_arcs(&folded.mesh, &folded.map, &folded.nodes, &folded.chains());
+        preview_arcs(&flipped.mesh, &flipped.map, &flipped.nodes, &flipped.chains());
     }
     assert!(errors > 5, "{errors}");
 }
 
 #[test]
-fn a_fold_beside_the_arcs_is_counted() {
+fn flipped_triangles_inside_a_patch_are_counted() {
     let s = samples::square(16, 2, 0.0);
-    let mut folded = s;
-    let v = samples::vertex_at(&folded.mesh, DVec3::new(0.25, 0.25, 0.0));
-    let ring: Vec<_> = folded.mesh.outgoing(v).collect();
+    let mut flipped = s;
+    let v = samples::vertex_at(&flipped.mesh, DVec3::new(0.25, 0.25, 0.0));
+    let ring: Vec<_> = flipped.mesh.outgoing(v).collect();
     let shift = DVec2::new(1.5, 0.3) / 16.0;
     // The same move in every chart of the ring, from the first on.
     let mut by = shift;
     for h in ring {
-        folded.map.uv[h.index() / 3][h.index() % 3] += by;
-        let over = folded.mesh.prev(h);
-        let e = folded.mesh.edge(over);
-        let p = i32::from(folded.map.jump[e.index()]);
-        by = crate::param::turn(by, if folded.mesh.halfedge(e) == over { -p } else { p });
+        flipped.map.uv[h.index() / 3][h.index() % 3] += by;
+        let over = flipped.mesh.prev(h);
+        let e = flipped.mesh.edge(over);
+        let p = i32::from(flipped.map.jump[e.index()]);
+        by = turn(by, if flipped.mesh.halfedge(e) == over { -p } else { p });
     }
-    let traced = trace(&folded).unwrap();
-    let maps = map_rectangles(&folded.layout, &traced, &Progress::new()).unwrap();
-    let flipped: Vec<usize> = maps.iter().map(|m| m.flipped).collect();
-    assert_eq!(flipped.iter().filter(|&&n| n > 0).count(), 1, "{flipped:?}");
+    let traced = trace(&flipped).unwrap();
+    let maps = map_rectangles(&flipped.layout, &traced, &Progress::new()).unwrap();
+    let counts: Vec<usize> = maps.iter().map(|m| m.flipped).collect();
+    assert_eq!(counts.iter().filter(|&&n| n > 0).count(), 1, "{counts:?}");
 }
 
 #[test]
-fn arcs_of_another_layout_are_not_taken() {
+fn chains_that_contradict_the_layout_are_errors() {
     let mut s = samples::cube(4, 1, 0.2);
     // Two chains exchanged: they do not join the nodes of their arcs.
     s.chains.swap(0, 1);
@@ -239,7 +178,7 @@ fn arcs_of_another_layout_are_not_taken() {
 }
 
 #[test]
-fn a_patch_that_is_no_rectangle_is_an_error() {
+fn a_patch_that_is_not_a_rectangle_is_an_error() {
     let mut s = samples::square(8, 1, 0.2);
     // The boundary is followed whatever the map says of it.
     let v = samples::vertex_at(&s.mesh, {
@@ -254,32 +193,12 @@ fn a_patch_that_is_no_rectangle_is_an_error() {
     assert!(matches!(error, RectangleError::NotRectangle { patch: 0, .. }), "{error}");
 }
 
-/// The base complex of a sample with some of its nodes, checked.
-fn emerged(mesh: &TriMesh, map: &SeamlessMap, nodes: &[VertexId]) -> CompletedLayout {
-    let e = complete_layout(mesh, map, nodes, 100.0).unwrap();
-    let maps = map_rectangles(&e.layout, &e.traced, &Progress::new()).unwrap();
-    assert!(maps.iter().all(|m| m.flipped == 0));
-    let parts: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
-    assert!((parts - area(mesh)).abs() < 1e-9);
-    let quads = refine(&e.layout, &e.traced.embedding, &maps, &Spacing::even(&e.layout, &vec![4; e.layout.chords]));
-    assert_eq!(euler(&quads), mesh.euler_characteristic());
-    e
-}
-
-/// The patches as cycles of nodes, each from its least corner on.
-fn cycles(layout: &crate::layout::QuadLayout) -> Vec<[u32; 4]> {
-    let least = |c: [u32; 4]| (0..4).map(|i| [0, 1, 2, 3].map(|k| c[(i + k) % 4])).min().unwrap();
-    let mut list: Vec<[u32; 4]> = layout.patches.iter().map(|p| least(p.corners)).collect();
-    list.sort_unstable();
-    list
-}
-
 #[test]
-fn with_all_nodes_the_layout_itself_emerges() {
+fn completion_with_all_nodes_yields_the_layout() {
     let mut list = vec![samples::slanted_torus(2, 0.0), samples::slanted_torus(3, 0.3), samples::cube(4, 2, 0.3)];
     list.extend([samples::square(12, 3, 0.3), samples::square(8, 1, 0.0), samples::cone(5, 4, 0.2)]);
     for s in list {
-        let e = emerged(&s.mesh, &s.map, &s.nodes);
+        let e = completed(&s.mesh, &s.map, &s.nodes);
         assert_eq!(cycles(&e.layout), cycles(&s.layout));
         assert_eq!(e.layout.nodes, s.layout.nodes);
         assert_eq!((e.layout.arcs.len(), e.layout.chords), (s.layout.arcs.len(), s.layout.chords));
@@ -287,37 +206,36 @@ fn with_all_nodes_the_layout_itself_emerges() {
 }
 
 #[test]
-fn regular_nodes_emerge_where_isolines_cross_or_end() {
+fn completion_adds_regular_nodes_at_crossings_and_ends() {
     for shake in [0.0, 0.2] {
         let s = samples::cone(3, 4, shake);
-        let irregular: Vec<_> = s.nodes.iter().zip(&s.layout.nodes).filter(|(_, n)| !n.is_regular()).collect();
-        let vertices: Vec<_> = irregular.into_iter().map(|(&v, _)| v).collect();
-        assert_eq!(vertices.len(), 4);
-        let e = emerged(&s.mesh, &s.map, &vertices);
+        assert_eq!(irregular(&s).len(), 4);
+        let e = completed(&s.mesh, &s.map, &irregular(&s));
         assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (7, 9, 3));
 
         let s = samples::cube(6, 2, shake);
-        let vertices: Vec<_> =
-            s.nodes.iter().zip(&s.layout.nodes).filter(|(_, n)| !n.is_regular()).map(|(&v, _)| v).collect();
-        let e = emerged(&s.mesh, &s.map, &vertices);
+        let e = completed(&s.mesh, &s.map, &irregular(&s));
         assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (8, 12, 6));
     }
 }
 
+/// The corners of a cube of side 1.
+fn cube_corners(mesh: &TriMesh) -> Vec<VertexId> {
+    let is_corner = |&v: &VertexId| mesh.position(v).to_array().iter().all(|x| (x - x.round()).abs() < 1e-9);
+    mesh.vertices().filter(is_corner).collect()
+}
+
 #[test]
-fn a_slanted_cube_has_the_lattice_for_its_base_complex() {
+fn the_base_complex_of_a_slanted_cube_is_the_lattice() {
     // Slanted by the direction (a, b), a cube's sides are squares over the lattice that hold a² + b² cells each.
     for (a, b) in [(1, 1), (2, 1), (3, 1), (5, 3)] {
         // On a regular mesh isolines cross on edges; with a little noise, close to them.
         for (n, shake) in [(5, 0.0), (7, 0.3), (3, 0.2), (3, 1e-5), (3, 1e-9)] {
             let along = DVec2::new(f64::from(a), f64::from(b)).normalize();
             let (mesh, map) = samples::cube_map(n, shake, along);
-            let corners: Vec<_> = mesh
-                .vertices()
-                .filter(|&v| mesh.position(v).to_array().iter().all(|x| (x - x.round()).abs() < 1e-9))
-                .collect();
+            let corners = cube_corners(&mesh);
             assert_eq!(corners.len(), 8);
-            let e = emerged(&mesh, &map, &corners);
+            let e = completed(&mesh, &map, &corners);
             assert_eq!(e.layout.n_irregular(), 8);
             let patches = 6 * (a * a + b * b) as usize;
             assert_eq!((e.layout.nodes.len(), e.layout.patches.len()), (patches + 2, patches));
@@ -342,8 +260,8 @@ fn beside(e: &CompletedLayout) -> Sample {
                 h = mesh.next(mesh.twin(h).unwrap());
             }
         }
-        let way = map.uv[start.index() / 3][(start.index() + 1) % 3] - map.uv[start.index() / 3][start.index() % 3];
-        let along = |k: u8| crate::param::turn(way, -i32::from(k)).x;
+        let edge = map.uv[start.index() / 3][(start.index() + 1) % 3] - map.uv[start.index() / 3][start.index() % 3];
+        let along = |k: u8| turn(edge, -i32::from(k)).x;
         let heading = (0..4u8).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap();
         chains.push(samples::OwnedChain { start, crossed, end: mesh.next(h), heading });
     }
@@ -351,14 +269,11 @@ fn beside(e: &CompletedLayout) -> Sample {
 }
 
 #[test]
-fn arcs_that_are_edges_already_are_traced_along_them() {
+fn arcs_along_edges_of_the_mesh_are_traced_along_them() {
     for (n, shake) in [(4, 0.0), (5, 0.2)] {
         let (mesh, map) = samples::cube_map(n, shake, DVec2::new(2.0, 1.0).normalize());
-        let corners: Vec<_> = mesh
-            .vertices()
-            .filter(|&v| mesh.position(v).to_array().iter().all(|x| (x - x.round()).abs() < 1e-9))
-            .collect();
-        let e = emerged(&mesh, &map, &corners);
+        let corners = cube_corners(&mesh);
+        let e = completed(&mesh, &map, &corners);
         let (traced, maps) = rectangles(&beside(&e));
         assert_eq!(traced.mesh.n_vertices(), e.traced.mesh.n_vertices());
         assert_eq!(traced.embedding.arcs, e.traced.embedding.arcs);
@@ -367,7 +282,7 @@ fn arcs_that_are_edges_already_are_traced_along_them() {
 }
 
 #[test]
-fn rounding_in_the_map_does_no_harm() {
+fn rounding_errors_of_the_map_are_tolerated() {
     for mut s in [samples::cube(6, 2, 0.2), samples::cone(5, 4, 0.0), samples::slanted_torus(3, 0.0)] {
         let mut noise = samples::Noise(1);
         for w in s.map.uv.iter_mut().flatten() {
@@ -380,24 +295,23 @@ fn rounding_in_the_map_does_no_harm() {
 }
 
 #[test]
-fn arcs_can_cross_folds() {
+fn arcs_can_cross_flipped_triangles() {
     let mut s = samples::square(16, 2, 0.2);
     // From one side of the arc from (0.5, 0) to (0.5, 0.5) to the other and beyond its ring.
     let away = |v: &VertexId| s.mesh.position(*v).distance(DVec3::new(0.4375, 0.25, 0.0));
     let v = s.mesh.vertices().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap();
-    let chart = |map: &SeamlessMap, h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
     let first = s.mesh.vertex_halfedge(v);
-    let edge = chart(&s.map, s.mesh.next(first)) - chart(&s.map, first);
+    let edge = corner_uv(&s.map, s.mesh.next(first)) - corner_uv(&s.map, first);
     let to = s.mesh.vector(first);
     // The chart of the first corner is the plane, turned.
-    let turned = (0..4).find(|&k| crate::param::turn(to.truncate(), k).distance(edge) < 1e-9).unwrap();
-    let mut by = crate::param::turn(DVec2::new(2.3, 0.4) / 16.0, turned);
+    let turned = (0..4).find(|&k| turn(to.truncate(), k).distance(edge) < 1e-9).unwrap();
+    let mut by = turn(DVec2::new(2.3, 0.4) / 16.0, turned);
     for h in s.mesh.outgoing(v).collect::<Vec<_>>() {
         s.map.uv[h.index() / 3][h.index() % 3] += by;
         let change = s.map.transition(&s.mesh, s.mesh.prev(h)).unwrap();
-        by = crate::param::turn(by, i32::from(change.turns));
+        by = turn(by, i32::from(change.turns));
     }
-    assert!(matches!(trace(&s), Err(TraceError::Fold { .. })));
+    assert!(matches!(trace(&s), Err(TraceError::FlippedTriangle { .. })));
     let traced = trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Cross).unwrap();
     let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
     sizes_are(&maps, DVec2::splat(0.5));
@@ -407,16 +321,15 @@ fn arcs_can_cross_folds() {
 }
 
 #[test]
-fn isolines_leave_a_node_that_lies_in_a_fold() {
+fn a_node_among_flipped_triangles_has_as_many_isolines_as_arcs() {
     for k in [3, 4, 5, 6] {
         for (i, far) in (0..8).flat_map(|i| [(i, 0.6), (i, 1.1), (i, 1.5)]) {
             let mut s = samples::cone(k, 4, 0.1);
-            // A neighbour of the centre goes round it beyond the next, so that the triangle between turns over.
+            // A neighbour of the centre is rotated about it past the next one, which flips the triangle between them.
             let ring: Vec<HalfedgeId> = s.mesh.outgoing(s.nodes[0]).collect();
             let moved = s.mesh.target(ring[i % ring.len()]);
-            let at = |map: &SeamlessMap, h: HalfedgeId| map.uv[h.index() / 3][h.index() % 3];
             let corner = s.mesh.next(ring[i % ring.len()]);
-            let spoke = at(&s.map, corner) - at(&s.map, ring[i % ring.len()]);
+            let spoke = corner_uv(&s.map, corner) - corner_uv(&s.map, ring[i % ring.len()]);
             let mut by = DVec2::from_angle(far).rotate(spoke) - spoke;
             let around: Vec<HalfedgeId> = s.mesh.outgoing(moved).collect();
             let begin = around.iter().position(|&h| h == corner).unwrap();
@@ -424,25 +337,53 @@ fn isolines_leave_a_node_that_lies_in_a_fold() {
                 let h = around[(begin + j) % around.len()];
                 s.map.uv[h.index() / 3][h.index() % 3] += by;
                 let change = s.map.transition(&s.mesh, s.mesh.prev(h)).unwrap();
-                by = crate::param::turn(by, i32::from(change.turns));
+                by = turn(by, i32::from(change.turns));
             }
-            let node = crate::embed::trace::isolines::nodes_at(&s.mesh, &s.nodes);
-            let exact = crate::embed::trace::isolines::exactness(&s.map);
-            let lines = crate::embed::trace::isolines::Isolines {
-                mesh: &s.mesh,
-                map: &s.map,
-                node: &node,
-                exact,
-                through_folds: true,
-            };
-            assert_eq!(lines.slots(s.nodes[0]).len(), k as usize, "{k} {i} {far}");
+            let node = nodes_at(&s.mesh, &s.nodes);
+            let rounding = map_rounding(&s.map);
+            let isolines = Isolines { mesh: &s.mesh, map: &s.map, node: &node, rounding, cross_flipped: true };
+            assert_eq!(isolines.outgoing(s.nodes[0]).len(), k as usize, "{k} {i} {far}");
             let traced =
                 trace_arcs(&s.mesh, &s.map, &s.layout, &s.nodes, &s.chains(), FlippedTriangles::Cross).unwrap();
             let maps = map_rectangles(&s.layout, &traced, &Progress::new()).unwrap();
-            let folded = s.mesh.faces().any(|f| s.map.is_flipped(f));
-            assert_eq!(maps.iter().any(|m| m.flipped > 0), folded);
+            let any_flipped = s.mesh.faces().any(|f| s.map.is_flipped(f));
+            assert_eq!(maps.iter().any(|m| m.flipped > 0), any_flipped);
             let whole: f64 = maps.iter().map(|m| area(&m.mesh)).sum();
             assert!((whole - area(&s.mesh)).abs() < 1e-9);
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn a_random_integer_grid_map_is_traced_back_to_its_layout(
+        heights in prop::collection::vec(1i32..4, 1..4),
+        n in prop::sample::select(vec![4, 6]),
+        shake in 0.0f64..0.3,
+        seed in 0u64..1000,
+    ) {
+        let s = samples::skyline(&heights, n, shake, seed);
+        let (_, maps) = rectangles(&s);
+        sizes_are(&maps, DVec2::ONE);
+        let c = completed(&s.mesh, &s.map, &s.nodes);
+        prop_assert_eq!(cycles(&c.layout), cycles(&s.layout));
+        // Its base complex may be coarser, with whole sizes.
+        let c = completed(&s.mesh, &s.map, &irregular(&s));
+        let maps = map_rectangles(&c.layout, &c.traced, &Progress::new()).unwrap();
+        prop_assert!(maps.iter().all(|m| (m.size - m.size.round()).length() < 1e-9));
+    }
+
+    #[test]
+    fn the_overlay_of_crossing_isolines_is_a_manifold_with_arcs_as_paths(
+        slant in (1u8..6, 0u8..6),
+        n in 3i32..7,
+        shake in 0.0f64..0.3,
+    ) {
+        let along = DVec2::new(f64::from(slant.0), f64::from(slant.1)).normalize();
+        let (mesh, map) = samples::cube_map(n, shake, along);
+        let c = completed(&mesh, &map, &cube_corners(&mesh));
+        prop_assert_eq!(c.layout.n_irregular(), 8);
     }
 }

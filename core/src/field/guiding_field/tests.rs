@@ -1,11 +1,11 @@
-//! Checks of fields of prescribed topology.
+//! Fields of prescribed topology: indices, turning numbers, penalties.
 
 use glam::DVec3;
 
 use super::super::samples::*;
 use super::super::singularities::inner_singularities;
 use super::*;
-use crate::mesh::VertexId;
+use crate::mesh::BreadthFirst;
 use crate::testing::square;
 
 /// Jumps of the given indices: those of least rotation of an arbitrary field, changed along a spanning tree.
@@ -13,21 +13,16 @@ fn jumps_of(mesh: &TriMesh, metric: &Metric, index: impl Fn(VertexId) -> i32) ->
     let angle = vec![0.0; mesh.n_faces()];
     let mut jump: Vec<i32> =
         inner_edges(mesh).map(|(h, t)| (-metric.transport(h, t) / FRAC_PI_2).round() as i32).collect();
-    let mut reached = vec![false; mesh.n_vertices()];
-    reached[0] = true;
-    let mut order: Vec<(VertexId, HalfedgeId)> = Vec::new();
-    let mut queue = std::collections::VecDeque::from([VertexId(0)]);
-    while let Some(v) = queue.pop_front() {
+    let mut tree = BreadthFirst::new(mesh.n_vertices());
+    tree.start(VertexId(0));
+    while let Some(v) = tree.visit() {
         for h in mesh.outgoing(v) {
-            let w = mesh.target(h);
-            if !std::mem::replace(&mut reached[w.index()], true) {
-                order.push((w, h));
-                queue.push_back(w);
-            }
+            tree.reach(mesh.target(h), h);
         }
     }
     let mut has = indices(mesh, metric, &angle, &jump);
-    for (v, h) in order.into_iter().rev() {
+    for &v in tree.reached().iter().rev() {
+        let Some(h) = tree.via(v) else { continue };
         let excess = has[v.index()] - index(v);
         let e = mesh.edge(h);
         jump[e.index()] += if mesh.halfedge(e) == h { excess } else { -excess };
@@ -41,11 +36,11 @@ fn solve(
     mesh: &TriMesh,
     metric: &Metric,
     jump: &[i32],
-    guides: &[DirectionPenalty],
+    penalties: &[DirectionPenalty],
     previous: Option<&[f64]>,
 ) -> GuidingField {
     let system = GuidingFieldSystem::new(mesh).unwrap();
-    system.solve(mesh, metric, jump, guides, previous, &Progress::new()).unwrap()
+    system.solve(mesh, metric, jump, penalties, previous, &Progress::new()).unwrap()
 }
 
 /// The vertex nearest to a point.
@@ -113,7 +108,7 @@ fn turning_numbers_of_a_torus() {
 }
 
 #[test]
-fn guides_of_open_and_of_known_branch_are_followed() {
+fn penalties_of_open_and_of_known_direction_are_followed() {
     let mesh = square(8);
     let metric = Metric::new(&mesh);
     let along_x: Vec<f64> = mesh.faces().map(|f| metric.angle_of(&mesh, f, DVec3::X).unwrap()).collect();
@@ -123,16 +118,16 @@ fn guides_of_open_and_of_known_branch_are_followed() {
     for (e, turn) in zero {
         jump[e.index()] = (turn / FRAC_PI_2).round() as i32;
     }
-    let guide = |k: usize, known: bool| {
+    let penalty = |k: usize, known: bool| {
         let (f, quarters) = (FaceId::new(5 * k), (7 * k % 4) as i32);
         let angle = along_x[f.index()] + 0.6 + f64::from(quarters) * FRAC_PI_2 + TAU * (k % 3) as f64;
         DirectionPenalty { face: f, angle, weight: RELIABLE_PENALTY, branch: known.then_some(quarters) }
     };
     for known in [0, 1, 20] {
-        let guides: Vec<DirectionPenalty> = (0..20).map(|k| guide(k, k < known)).collect();
-        let field = solve(&mesh, &metric, &jump, &guides, None);
+        let penalties: Vec<DirectionPenalty> = (0..20).map(|k| penalty(k, k < known)).collect();
+        let field = solve(&mesh, &metric, &jump, &penalties, None);
         assert!(field.energy < 1e-18);
-        for (k, (g, b)) in guides.iter().zip(&field.branch).enumerate() {
+        for (k, (g, b)) in penalties.iter().zip(&field.branch).enumerate() {
             let off = (field.angle[g.face.index()] + f64::from(*b) * FRAC_PI_2 - g.angle) / TAU;
             assert!((off - off.round()).abs() < 1e-9);
             assert!(known == 0 || *b == (7 * k % 4) as i32);
@@ -141,34 +136,34 @@ fn guides_of_open_and_of_known_branch_are_followed() {
 }
 
 #[test]
-fn a_warm_start_keeps_what_was_assigned() {
+fn a_warm_start_keeps_the_rounding() {
     let mesh = octasphere(8);
     let metric = Metric::new(&mesh);
     let jump = jumps_of(&mesh, &metric, |v| layouts()[0].iter().any(|l| nearest(&mesh, l.0.normalize()) == v).into());
-    let guides: Vec<DirectionPenalty> = (0..mesh.n_faces())
+    let penalties: Vec<DirectionPenalty> = (0..mesh.n_faces())
         .step_by(7)
         .map(|f| DirectionPenalty { face: FaceId::new(f), angle: 0.01 * f as f64, weight: 3.0, branch: None })
         .collect();
-    let cold = solve(&mesh, &metric, &jump, &guides, None);
-    let warm = solve(&mesh, &metric, &jump, &guides, Some(&cold.angle));
+    let cold = solve(&mesh, &metric, &jump, &penalties, None);
+    let warm = solve(&mesh, &metric, &jump, &penalties, Some(&cold.angle));
     assert_eq!((&cold.angle, &cold.branch), (&warm.angle, &warm.branch));
-    // It cannot be worse than with all guides one branch on.
+    // Rounding from the turned field gives an objective hardly smaller.
     let sum = |field: &GuidingField| {
         let off = |(g, b): (&DirectionPenalty, &i32)| {
             let a = (field.angle[g.face.index()] + f64::from(*b) * FRAC_PI_2 - g.angle) / TAU;
             g.weight * ((a - a.round()) * TAU).powi(2)
         };
-        field.energy + guides.iter().zip(&field.branch).map(off).sum::<f64>()
+        field.energy + penalties.iter().zip(&field.branch).map(off).sum::<f64>()
     };
     let free = solve(&mesh, &metric, &jump, &[], None);
     assert!(free.energy < cold.energy);
     let turned: Vec<f64> = free.angle.iter().map(|a| a + 0.3).collect();
-    let other = solve(&mesh, &metric, &jump, &guides, Some(&turned));
+    let other = solve(&mesh, &metric, &jump, &penalties, Some(&turned));
     assert!(sum(&cold) < 1.2 * sum(&other), "{} {}", sum(&cold), sum(&other));
 }
 
 #[test]
-fn components_are_independent_and_bad_input_is_refused() {
+fn components_are_independent_and_malformed_input_is_refused() {
     let mesh = cells(&[[0, 0, 0], [3, 0, 0]], 3);
     let metric = Metric::new(&mesh);
     let system = GuidingFieldSystem::new(&mesh).unwrap();
@@ -184,15 +179,16 @@ fn components_are_independent_and_bad_input_is_refused() {
     let jump: Vec<i32> = inner_edges(&mesh)
         .map(|(h, t)| ((along(mesh.face(t)) - along(mesh.face(h)) - metric.transport(h, t)) / FRAC_PI_2).round() as i32)
         .collect();
-    let guide = DirectionPenalty { face: FaceId(0), angle: along(FaceId(0)), weight: 1.0, branch: Some(0) };
-    let solve =
-        |jump: &[i32], guides: &[DirectionPenalty]| system.solve(&mesh, &metric, jump, guides, None, &Progress::new());
-    let field = solve(&jump, &[guide]).unwrap();
+    let penalty = DirectionPenalty { face: FaceId(0), angle: along(FaceId(0)), weight: 1.0, branch: Some(0) };
+    let solve = |jump: &[i32], penalties: &[DirectionPenalty]| {
+        system.solve(&mesh, &metric, jump, penalties, None, &Progress::new())
+    };
+    let field = solve(&jump, &[penalty]).unwrap();
     assert!(field.energy < 1e-18);
-    assert!((field.angle[0] - guide.angle).abs() < 1e-9);
+    assert!((field.angle[0] - penalty.angle).abs() < 1e-9);
     let index = indices(&mesh, &metric, &field.angle, &jump);
     assert!(mesh.vertices().all(|v| index[v.index()] == corner(v)));
     assert!(matches!(solve(&jump[1..], &[]), Err(FieldError::WrongLength { .. })));
-    let nan = DirectionPenalty { angle: f64::NAN, ..guide };
+    let nan = DirectionPenalty { angle: f64::NAN, ..penalty };
     assert!(matches!(solve(&jump, &[nan]), Err(FieldError::Solve(_))));
 }

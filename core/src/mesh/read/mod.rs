@@ -1,61 +1,19 @@
-//! Reading mesh files into polygons, one reader per format.
+//! Readers of mesh files, one per format.
 //!
-//! A reader takes bytes and returns a [`RawMesh`]: what the file says, indices checked, nothing repaired. The
-//! format is told by the content; the file name decides only where the content is silent. No reader trusts a
-//! count in a header: memory grows with the bytes that are really there.
+//! A reader takes bytes and returns a [`RawMesh`]: the polygons of the file, indices checked, nothing repaired. The format
+//! is recognised by the content, and by the file name only if the content does not tell. Readers do not trust counts in
+//! headers: memory grows with the bytes that are there.
 
 mod obj;
 mod off;
 mod ply;
+mod raw_mesh;
 mod stl;
 mod text;
 
-use glam::DVec3;
+use super::error::LoadError;
 
-use super::load::{FaceRef, LoadError};
-
-/// The polygons of a file, not yet checked for anything but their indices.
-#[derive(Debug, Default)]
-pub(super) struct RawMesh {
-    /// Vertex positions in file units.
-    pub positions: Vec<DVec3>,
-    /// The corners of all polygons, one after the other.
-    pub corners: Vec<u32>,
-    /// Where each polygon ends in `corners`.
-    pub ends: Vec<u32>,
-    /// Line of each polygon; empty for binary files.
-    pub lines: Vec<u32>,
-    /// Number of the first vertex and of the first face, as the format counts: 1 in OBJ, 0 elsewhere.
-    pub base: usize,
-    /// Whether the format has no shared vertices, so that they must be welded by position.
-    pub soup: bool,
-}
-
-impl RawMesh {
-    /// Ends the polygon whose corners were pushed last.
-    fn close_polygon(&mut self, line: Option<usize>) {
-        self.ends.push(self.corners.len() as u32);
-        if let Some(line) = line {
-            self.lines.push(line as u32);
-        }
-    }
-
-    /// Number of polygons.
-    pub fn n_polygons(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// The corners of a polygon.
-    pub fn polygon(&self, i: usize) -> &[u32] {
-        let start = if i == 0 { 0 } else { self.ends[i - 1] as usize };
-        &self.corners[start..self.ends[i] as usize]
-    }
-
-    /// How to name a polygon to the user.
-    pub fn face_ref(&self, polygon: usize) -> FaceRef {
-        FaceRef { number: polygon + self.base, line: self.lines.get(polygon).map(|&l| l as usize) }
-    }
-}
+pub(super) use raw_mesh::RawMesh;
 
 /// The file formats that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +30,7 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<RawMesh, LoadError> {
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(LoadError::Empty);
     }
-    let raw = match sniff(bytes).or_else(|| by_extension(name)) {
+    let raw = match format_of_content(bytes).or_else(|| format_of_name(name)) {
         Some(Format::Obj) => obj::read(bytes)?,
         Some(Format::Off) => off::read(bytes)?,
         Some(Format::Ply) => ply::read(bytes)?,
@@ -83,12 +41,12 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<RawMesh, LoadError> {
     Ok(raw)
 }
 
-/// Checks what every format needs: finite coordinates, known indices, counts that ids can hold.
+/// Checks what all formats require: finite coordinates, known indices, counts that 32-bit ids can number.
 fn check(raw: &RawMesh) -> Result<(), LoadError> {
     if let Some(vertex) = raw.positions.iter().position(|p| !p.is_finite()) {
         return Err(LoadError::NotFinite { vertex: vertex + raw.base });
     }
-    // Half-edge ids are 32 bits; a polygon of n corners becomes n − 2 triangles of three half-edges.
+    // A polygon of n corners becomes n − 2 triangles of three half-edges each. A quarter leaves room for splits.
     if raw.corners.len() > u32::MAX as usize / 4 || raw.positions.len() > u32::MAX as usize / 4 {
         return Err(LoadError::TooLarge);
     }
@@ -104,8 +62,8 @@ fn check(raw: &RawMesh) -> Result<(), LoadError> {
     Ok(())
 }
 
-/// The format that the content itself tells.
-fn sniff(bytes: &[u8]) -> Option<Format> {
+/// The format recognised by the content.
+fn format_of_content(bytes: &[u8]) -> Option<Format> {
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
         return Some(Format::Ply);
     }
@@ -123,7 +81,8 @@ fn sniff(bytes: &[u8]) -> Option<Format> {
     text::lines(bytes).any(|(_, line)| is_obj(line)).then_some(Format::Obj)
 }
 
-fn by_extension(name: &str) -> Option<Format> {
+/// The format of the extension of a file name.
+fn format_of_name(name: &str) -> Option<Format> {
     let (_, extension) = name.rsplit_once('.')?;
     match extension.to_ascii_lowercase().as_str() {
         "obj" => Some(Format::Obj),

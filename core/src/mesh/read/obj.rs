@@ -1,15 +1,15 @@
-//! Wavefront OBJ: `v` and `f` lines; everything else is passed over.
+//! Wavefront OBJ: `v` and `f` lines; all others are ignored.
 //!
-//! Written here because errors must name their line, indices may be negative (counted back from the latest
-//! vertex), faces may have any number of corners, and coordinates are wanted in full precision.
+//! No library is used because errors must name their line, indices may be negative (counted back from the latest vertex),
+//! faces may have any number of corners, and coordinates are read in double precision.
 
 use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::RawMesh;
+use super::raw_mesh::RawMesh;
 use super::text::{coordinate, lines, number, show, syntax, tokens};
-use crate::mesh::load::LoadError;
+use crate::mesh::error::LoadError;
 
 pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
     let bytes = join_continued(bytes);
@@ -43,23 +43,23 @@ fn corner(word: &[u8], n_vertices: usize, line: usize) -> Result<u32, LoadError>
     u32::try_from(index).map_err(|_| syntax(line, format!("there is no vertex {written} here")))
 }
 
-/// Joins lines that end in a backslash with the line after them, keeping the number of lines.
+/// Joins lines that end in a backslash with the next one; empty lines keep the line numbers.
 fn join_continued(bytes: &[u8]) -> Cow<'_, [u8]> {
     if !bytes.contains(&b'\\') {
         return Cow::Borrowed(bytes);
     }
     let mut joined = Vec::with_capacity(bytes.len());
-    let mut owed = 0;
+    let mut missing_lines = 0;
     for line in bytes.split(|&b| b == b'\n') {
         let text = line.strip_suffix(b"\r").unwrap_or(line);
         if let Some(head) = text.strip_suffix(b"\\") {
             joined.extend_from_slice(head);
             joined.push(b' ');
-            owed += 1;
+            missing_lines += 1;
         } else {
             joined.extend_from_slice(text);
-            joined.extend(std::iter::repeat_n(b'\n', owed + 1));
-            owed = 0;
+            joined.extend(std::iter::repeat_n(b'\n', missing_lines + 1));
+            missing_lines = 0;
         }
     }
     Cow::Owned(joined)
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_ways_to_write_a_corner() {
+    fn corners_are_read_in_all_notations() {
         let text = b"v 0 0 0 1 0 0\r\nv 1 0 0\n# caf\xe9\nv 0 1 0\nf 1/1/1 2//2 3/4\nf -3 -2 \\\n -1\nf 1 2 3\n";
         let raw = read(text).unwrap();
         assert_eq!(raw.positions.len(), 3);

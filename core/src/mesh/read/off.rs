@@ -1,14 +1,14 @@
-//! Geomview OFF, with its variants that add colours, normals or texture coordinates to a vertex.
+//! Geomview OFF, with its variants that add colours, normals or texture coordinates to vertices.
 //!
-//! One vertex or face per line; whatever follows the coordinates or the corners on a line is passed over.
+//! One vertex or face per line; what follows the coordinates or the corners on a line is ignored.
 
 use glam::DVec3;
 
-use super::RawMesh;
+use super::raw_mesh::RawMesh;
 use super::text::{coordinate, lines, number, show, syntax, tokens};
-use crate::mesh::load::LoadError;
+use crate::mesh::error::LoadError;
 
-/// Whether a word is the keyword that opens an OFF file of points in space.
+/// Whether a word is the keyword of an OFF file of three-dimensional points.
 pub(super) fn is_header(word: &[u8]) -> bool {
     word.strip_suffix(b"OFF")
         .is_some_and(|prefix| matches!(prefix, b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN"))
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn variants_of_the_header() {
+    fn headers_are_read_in_all_variants() {
         let body = "0 0 0 255 0 0\n1 0 0 255 0 0 # red\n\n0 1 0 9 9 9\n3 0 1 2 255 255 255\n";
         for head in ["OFF\n3 1 0\n", "OFF 3 1\n", "# by hand\nCOFF\r\n# c\n3 1 0\r\n", "3 1 0\n"] {
             let raw = read(format!("{head}{body}").as_bytes()).unwrap();

@@ -1,16 +1,16 @@
-//! PLY, text and binary of both byte orders.
+//! PLY, as text and as binary of both byte orders.
 //!
-//! The header declares elements and their properties; every value is read as declared, and only `x`, `y`, `z` of
-//! `vertex` and the list `vertex_indices` (or `vertex_index`) of `face` are kept. Written here because a header
-//! must not be believed (elements without properties, counts beyond the file), numbers are written in more ways
-//! than one, and errors in the text kind must name their line.
+//! The header declares elements and their properties. All values are read as declared; `x`, `y`, `z` of `vertex` and the
+//! list `vertex_indices` (or `vertex_index`) of `face` are kept. No library is used because headers cannot be trusted
+//! (elements without properties, counts beyond the file) and errors in text files must name their line.
 
 use glam::DVec3;
 
-use super::RawMesh;
+use super::raw_mesh::RawMesh;
 use super::text::{number, show, tokens};
-use crate::mesh::load::LoadError;
+use crate::mesh::error::LoadError;
 
+/// The type of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Scalar {
     I8,
@@ -42,7 +42,7 @@ impl Scalar {
 #[derive(Debug)]
 struct Property {
     name: Vec<u8>,
-    /// Type of the length, for a list.
+    /// Type of the length, if the property is a list.
     length: Option<Scalar>,
     scalar: Scalar,
 }
@@ -70,7 +70,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, LoadError> {
         match element.name.as_slice() {
             b"vertex" => read_vertices(&mut source, element, &mut raw)?,
             b"face" => read_faces(&mut source, element, &mut raw)?,
-            // An element without properties takes no bytes, however many are announced.
+            // Elements without properties take no bytes, whatever their declared count.
             _ if element.properties.is_empty() => {}
             _ => {
                 for i in 0..element.count {
@@ -97,16 +97,19 @@ fn read_header(source: &mut Source<'_>) -> Result<(Encoding, Vec<Element>), Load
             [b"format", b"binary_little_endian", _] => encoding = Some(Encoding::Little),
             [b"format", b"binary_big_endian", _] => encoding = Some(Encoding::Big),
             [b"element", name, count] => {
-                let count = number(count).ok_or_else(|| source.error("this is not a number of elements"))?;
+                let count =
+                    number(count).ok_or_else(|| source.error("the number of elements is not a whole number"))?;
                 elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", rest @ ..] => {
-                let property = parse_property(rest).ok_or_else(|| source.error("this property is not understood"))?;
-                let element = elements.last_mut().ok_or_else(|| source.error("a property without an element"))?;
+                let property =
+                    parse_property(rest).ok_or_else(|| source.error("the property declaration is malformed"))?;
+                let element =
+                    elements.last_mut().ok_or_else(|| source.error("a property is declared before any element"))?;
                 element.properties.push(property);
             }
             [b"end_header"] => break,
-            [word, ..] => return Err(source.error(format!("“{}” is not understood in the header", show(word)))),
+            [word, ..] => return Err(source.error(format!("“{}” is no keyword of the header", show(word)))),
         }
     }
     let encoding = encoding.ok_or_else(|| source.error("the header does not name the format"))?;
@@ -157,7 +160,7 @@ fn read_faces(source: &mut Source<'_>, element: &Element, raw: &mut RawMesh) -> 
             let keep = is_corners(property);
             source.property(property, |value| {
                 if keep {
-                    // A value that is no index becomes one that no mesh has only if it is also reported.
+                    // What is no index is cut to some number here and reported below.
                     valid &= value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0;
                     raw.corners.push(value as u32);
                 }
@@ -171,14 +174,14 @@ fn read_faces(source: &mut Source<'_>, element: &Element, raw: &mut RawMesh) -> 
     Ok(())
 }
 
-/// The bytes of a file and how far they are read.
+/// The bytes of a file and the position in them.
 struct Source<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Line read last, from 1.
     line: usize,
     encoding: Encoding,
-    /// What is left of that line, for text.
+    /// The rest of that line, in text.
     row: &'a [u8],
 }
 
@@ -201,7 +204,7 @@ impl<'a> Source<'a> {
         Some(&rest[..end])
     }
 
-    /// Goes to the next element: to the next line that is not blank, for text.
+    /// Goes to the next element; in text, to the next line that is not blank.
     fn open_row(&mut self, element: &Element, i: usize) -> Result<(), LoadError> {
         let ended = match self.encoding {
             Encoding::Text => loop {

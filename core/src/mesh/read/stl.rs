@@ -1,23 +1,25 @@
-//! STL, text and binary: triangles that share no vertices.
+//! STL, as text and as binary: a triangle soup.
 //!
-//! Written here because the two kinds are told apart by the file's length (a binary header may well begin with
-//! "solid"), and errors in the text kind must name their line.
+//! No library is used because the length of the file tells binary from text (a binary header may begin with "solid" too),
+//! and errors in text files must name their line.
 
 use glam::DVec3;
 
-use super::RawMesh;
+use super::raw_mesh::RawMesh;
 use super::text::{coordinate, lines, syntax, tokens};
-use crate::mesh::load::LoadError;
+use crate::mesh::error::LoadError;
 
-/// A binary file: 80 bytes of anything, the number of triangles, then 50 bytes for each.
+/// Bytes before the triangles of a binary file: 80 of any content and the number of triangles.
 const HEADER: usize = 84;
+/// Bytes of a triangle of a binary file: normal and three corners of three 4-byte numbers each, 2 bytes of attributes.
 const RECORD: usize = 50;
 
-/// Whether the length is just what the number of triangles asks for.
+/// Whether the length of the file is that of the declared number of triangles.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
     declared(bytes).is_some_and(|n| n.checked_mul(RECORD).is_some_and(|size| size + HEADER == bytes.len()))
 }
 
+/// The declared number of triangles.
 fn declared(bytes: &[u8]) -> Option<usize> {
     let n = bytes.get(HEADER - 4..HEADER)?;
     Some(u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize)

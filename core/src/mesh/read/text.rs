@@ -1,10 +1,10 @@
-//! Lines, tokens and numbers of text formats, over bytes so that any encoding of comments is fine.
+//! Lines, tokens and numbers of text formats, read as bytes, since comments may be of any encoding.
 
 use std::str::FromStr;
 
-use crate::mesh::load::LoadError;
+use crate::mesh::error::LoadError;
 
-/// The lines with their numbers from 1, comments from `#` on cut off.
+/// The lines with their numbers from 1, without comments (from `#` on).
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     bytes.split(|&b| b == b'\n').enumerate().map(|(i, line)| {
         let end = line.iter().position(|&b| b == b'#').unwrap_or(line.len());
@@ -17,7 +17,7 @@ pub(super) fn tokens(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|t| !t.is_empty())
 }
 
-/// A number, `None` where the token is none.
+/// The number a token stands for; `None` if it is no number.
 pub(super) fn number<T: FromStr>(token: &[u8]) -> Option<T> {
     std::str::from_utf8(token).ok()?.parse().ok()
 }
@@ -37,9 +37,9 @@ pub(super) fn syntax(line: usize, message: impl Into<String>) -> LoadError {
     LoadError::Syntax { line: Some(line), message: message.into() }
 }
 
-/// A token for a message: printable and short.
+/// A token for a message: control characters replaced, shortened.
 pub(super) fn show(token: &[u8]) -> String {
-    // Longer tokens are noise in a message.
+    // Bytes of a token that are shown; chosen by hand.
     const SHOWN: usize = 24;
     let text = String::from_utf8_lossy(&token[..token.len().min(SHOWN)]);
     let mut shown: String = text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();

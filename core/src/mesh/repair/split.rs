@@ -1,20 +1,22 @@
-//! One vertex for each fan of triangles.
+//! One vertex per fan of triangles.
 //!
-//! Corners of triangles that share an edge are united at both ends of it; the classes are the fans. This depends on
-//! no orientation, so it can be done before there is one.
+//! Where two triangles share an edge, their corners at both ends are joined; the resulting sets of corners are the fans.
+//! This needs no orientation, so it comes before orientation.
 
-use super::{NONE, Pairs, Repair, Work};
+use super::report::Repair;
+use super::soup::{NONE, Pairs, TriangleSoup};
+use crate::union_find::UnionFind;
 
-impl Work {
-    /// Gives each fan of triangles at a vertex a vertex of its own.
+impl TriangleSoup {
+    /// Splits each vertex into one vertex per fan of triangles; the first fan keeps the vertex.
     pub(super) fn split_vertices(&mut self, pairs: &Pairs) {
-        let mut fans = Fans::new(3 * self.faces.len());
+        let mut fans = UnionFind::new(3 * self.faces.len());
         for (h, &g) in pairs.iter().enumerate().filter(|&(h, &g)| g != NONE && (h as u32) < g) {
             for (i, v) in self.faces[h / 3].into_iter().enumerate() {
                 if let Some(j) = self.faces[g as usize / 3].iter().position(|&w| w == v)
                     && [self.side(g).0, self.side(g).1].contains(&v)
                 {
-                    fans.unite(3 * (h as u32 / 3) + i as u32, 3 * (g / 3) + j as u32);
+                    fans.join(3 * (h as u32 / 3) + i as u32, 3 * (g / 3) + j as u32);
                 }
             }
         }
@@ -40,28 +42,5 @@ impl Work {
         if let Some(&first) = split.first() {
             self.repairs.push(Repair::SplitVertices { count: split.len(), first: self.vertex_ref(first as usize) });
         }
-    }
-}
-
-/// Corners of triangles, united to the fans they form around their vertices.
-struct Fans(Vec<u32>);
-
-impl Fans {
-    fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-
-    /// The smaller root stays a root.
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
     }
 }

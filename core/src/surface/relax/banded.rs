@@ -1,9 +1,10 @@
-//! A symmetric positive definite system with a narrow band, open or closed to a ring.
+//! Symmetric positive definite systems with a narrow band, or with a cyclic one.
 //!
-//! A ring of unknowns in which `i` meets `i ± 1` and `i ± 2` is folded flat (0, n−1, 1, n−2, …): neighbours at
-//! distance 2 in the ring are then at most 4 apart, and the corner entries of the cyclic matrix vanish.
+//! In a cyclic system unknown `i` is coupled to `i ± 1` and `i ± 2` modulo `n`. The unknowns are reordered as 0, n−1,
+//! 1, n−2, … so that coupled ones are at most 4 apart: the matrix is banded, without the corner entries of the cyclic
+//! order.
 
-/// Entries kept left of the diagonal: 4 for a folded ring of reach 2.
+/// Entries left of the diagonal: 4 for a reordered cyclic system with couplings up to distance 2.
 const BAND: usize = 4;
 
 /// The matrix, as rows of its lower band.
@@ -11,13 +12,13 @@ const BAND: usize = 4;
 pub(super) struct Banded {
     /// `rows[p][k]` is the entry in column `p − k`.
     rows: Vec<[f64; BAND + 1]>,
-    ring: bool,
+    cyclic: bool,
 }
 
 impl Banded {
     /// A zero matrix over `n` unknowns.
-    pub fn new(n: usize, ring: bool) -> Self {
-        Self { rows: vec![[0.0; BAND + 1]; n], ring }
+    pub fn new(n: usize, cyclic: bool) -> Self {
+        Self { rows: vec![[0.0; BAND + 1]; n], cyclic }
     }
 
     /// Sets all entries to zero.
@@ -25,20 +26,21 @@ impl Banded {
         self.rows.fill([0.0; BAND + 1]);
     }
 
-    fn place(&self, i: usize) -> usize {
+    /// The row of unknown `i`.
+    fn row(&self, i: usize) -> usize {
         let n = self.rows.len();
-        match self.ring {
+        match self.cyclic {
             false => i,
             true if i < n.div_ceil(2) => 2 * i,
             true => 2 * (n - i) - 1,
         }
     }
 
-    /// Adds `weight · g gᵀ`, `g` given by its entries at unknowns at most 2 apart.
+    /// Adds `weight · g gᵀ`, where `g` has these entries `(unknown, value)` at unknowns at most 2 apart.
     pub fn add_outer(&mut self, g: &[(usize, f64)], weight: f64) {
         for &(i, a) in g {
             for &(j, b) in g {
-                let (p, q) = (self.place(i), self.place(j));
+                let (p, q) = (self.row(i), self.row(j));
                 if p >= q {
                     self.rows[p][p - q] += weight * a * b;
                 }
@@ -46,14 +48,14 @@ impl Banded {
         }
     }
 
-    /// Solves for the unknowns in `free` and leaves the others zero. Each diagonal entry is first raised by the
-    /// factor `1 + damping`. `None` where the matrix is not positive definite.
+    /// Solves for the unknowns that are `free`; the others are 0. Diagonal entries are multiplied by `1 + damping`.
+    /// `None` where the matrix is not positive definite.
     pub fn solve(&self, rhs: &[f64], free: &[bool], damping: f64) -> Option<Vec<f64>> {
         let n = self.rows.len();
         let mut on = vec![false; n];
         let mut x = vec![0.0; n];
         for i in 0..n {
-            let p = self.place(i);
+            let p = self.row(i);
             on[p] = free[i];
             x[p] = if free[i] { rhs[i] } else { 0.0 };
         }
@@ -74,7 +76,7 @@ impl Banded {
                 rows[p][k] = v / rows[q][0];
                 d -= rows[p][k] * v;
             }
-            // A number that is not one is refused too.
+            // NaN is refused too.
             if d.is_nan() || d <= 0.0 {
                 return None;
             }
@@ -91,7 +93,7 @@ impl Banded {
                 x[p] -= rows[p + k][k] * x[p + k];
             }
         }
-        Some((0..n).map(|i| if free[i] { x[self.place(i)] } else { 0.0 }).collect())
+        Some((0..n).map(|i| if free[i] { x[self.row(i)] } else { 0.0 }).collect())
     }
 }
 
@@ -100,13 +102,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solves_chains_and_rings_of_any_size() {
-        for ring in [false, true] {
+    fn open_and_cyclic_systems_of_any_size_are_solved() {
+        for cyclic in [false, true] {
             for n in 3..12 {
-                let mut m = Banded::new(n, ring);
+                let mut m = Banded::new(n, cyclic);
                 let mut dense = vec![vec![0.0; n]; n];
                 for i in 0..n {
-                    let reach = if ring { 3 } else { 3.min(n - i) };
+                    let reach = if cyclic { 3 } else { 3.min(n - i) };
                     let mut g: Vec<(usize, f64)> = Vec::new();
                     for k in 0..reach {
                         g.push(((i + k) % n, 1.0 + (i * 7 + k * 3) as f64 % 5.0 - 2.0 * k as f64));
@@ -124,7 +126,7 @@ mod tests {
                 assert_eq!(x[n / 2], 0.0);
                 for i in (0..n).filter(|&i| free[i]) {
                     let row: f64 = (0..n).map(|j| dense[i][j] * x[j]).sum();
-                    assert!((row - rhs[i]).abs() < 1e-9, "n {n} ring {ring} row {i}: {row} {}", rhs[i]);
+                    assert!((row - rhs[i]).abs() < 1e-9, "n {n} cyclic {cyclic} row {i}: {row} {}", rhs[i]);
                 }
             }
         }

@@ -1,43 +1,52 @@
-//! The elastica energy of a curve in its strip, by intrinsic measures only, and its descent.
+//! The elastica energy of a curve in its strip, from intrinsic measures only, and its minimisation.
 //!
-//! Two crossings in a row share an end of their edges, the pivot. With `a`, `b` their distances from it and `θ`
-//! the angle of the triangle there, the segment has the length `l² = a² + b² − 2ab cos θ` and makes the angle
-//! `φ = ±atan2(b cos θ − a, b sin θ)` with the normal of the edge it leaves, `φ ± θ` with that of the edge it
-//! reaches (+ around a pivot to the right). The difference `γ` of the angles at one crossing is the geodesic
-//! turning there: what is seen after unfolding both triangles. The energy is `Σ l (1 + α q) + β Σ γ² / l̄`, `l̄`
-//! the mean of both segments: (8.1) of Campen's thesis. An open end counts as if the curve were mirrored at the
-//! boundary, so that it meets it orthogonally. A fidelity term holds the curve near where it came from.
+//! The edges of two consecutive crossings share an end, the pivot. Let `a`, `b` be the distances of the crossings from
+//! the pivot and `θ` the angle of the triangle there. The segment has length `l`, `l² = a² + b² − 2ab cos θ`. It makes
+//! the angle `φ = ±atan2(b cos θ − a, b sin θ)` with the normal of the edge it leaves and `φ ± θ` with that of the edge
+//! it reaches (+ for a pivot to the right). The difference `γ` of the two angles at a crossing is the geodesic turning
+//! there, the turning after both triangles are unfolded. The energy is `Σ l (1 + α q) + β Σ γ² / l̄` with `l̄` the mean
+//! length of both segments: (8.1) of Campen's thesis. An open end counts as if the curve were mirrored at the boundary,
+//! so that it meets the boundary orthogonally. A fidelity term keeps the curve near the original.
 //!
-//! Descent is Gauss–Newton with the crossings kept inside their intervals (projected Newton): the turning
-//! residuals `γ / √l̄` are differentiated exactly, of the length only the part that is never negative is kept in
-//! the Hessian, which couples a crossing to the two on each side: one banded solve per step.
+//! The method is Gauss–Newton with bounds (projected Newton). The turning residuals `γ / √l̄` are differentiated
+//! exactly; of the second derivative of the length only the non-negative part is kept. A crossing is coupled to the two
+//! on each side, so each step is one banded solve.
 
 use glam::DVec3;
 
-use crate::mesh::{FaceId, TriMesh};
-
 use super::banded::Banded;
-use super::strip::{Side, TriangleStrip};
-use super::{Alignment, CurveCost, RelaxOptions};
+use super::options::{Alignment, CurveCost, RelaxOptions};
+use super::triangle_strip::TriangleStrip;
+use crate::mesh::{FaceId, TriMesh};
+use crate::surface::vertex_fan::Side;
 
-/// Angle step of the differences that differentiate the alignment, in radians: large against rounding, small
-/// against the 45 degrees over which an alignment varies.
+/// Step of the finite differences of the alignment by direction, in radians: large against rounding, small against the
+/// 45 degrees over which an alignment varies.
 const ALIGNMENT_STEP: f64 = 1e-3;
-/// Smallest angle of a triangle that is told from zero, in radians; keeps needles from dividing by zero.
+/// Least angle of a triangle, in radians. Smaller angles count as this one, so that needles do not cause a division by
+/// zero.
 const MIN_ANGLE: f64 = 1e-7;
-/// Shortest segment that is told from none, for meshes of diagonal 1; the square of it is still a normal number.
+/// Least length of a segment, for meshes of bounding-box diagonal 1. Shorter segments count as this long; the square is
+/// still a normal number.
 const MIN_LENGTH: f64 = 1e-100;
-/// Decrease that a step must reach, as a fraction of what the gradient promises (Armijo).
+/// Least decrease of a step, as a fraction of what the gradient predicts (Armijo condition).
 const ARMIJO: f64 = 1e-4;
-/// Halvings of a step before the damping is raised instead.
-const HALVINGS: usize = 6;
-/// Descent stops once a step gains less than this fraction of the energy.
+/// Step sizes tried, each half the one before; after that the damping is raised instead.
+const STEP_SIZES: usize = 6;
+/// Descent stops when a step decreases the energy by less than this fraction.
 const MIN_GAIN: f64 = 1e-5;
+/// Levenberg–Marquardt damping of the diagonal: the least; the least after a step without decrease; the one at which
+/// descent stops; and the factors after steps without and with decrease.
+const LEAST_DAMPING: f64 = 1e-6;
+const LEAST_RAISED_DAMPING: f64 = 1e-3;
+const MOST_DAMPING: f64 = 1e4;
+const DAMPING_INCREASE: f64 = 30.0;
+const DAMPING_DECREASE: f64 = 0.1;
 
-/// A segment between two crossings.
+/// The segment between two crossings.
 struct Segment {
     face: FaceId,
-    /// Angle of the triangle at the pivot with its sine and cosine.
+    /// Angle `θ` of the triangle at the pivot, with its sine and cosine.
     angle: f64,
     sin: f64,
     cos: f64,
@@ -45,34 +54,35 @@ struct Segment {
     pivot: Side,
 }
 
-/// What a segment measures at the present crossings. Derivatives are by the parameters of its two crossings.
+/// Length and direction of a segment, with derivatives by the parameters of its two crossings.
 #[derive(Clone, Copy)]
-struct Measure {
+struct SegmentMeasure {
     length: f64,
-    /// Angle to the normal of the edge left, positive to the left.
+    /// Angle `φ` to the normal of the edge that the segment leaves, positive to the left.
     phi: f64,
     d_length: [f64; 2],
     d_phi: [f64; 2],
 }
 
-/// The energy over the parameters of a strip whose crossed edges stay the same.
+/// The energy as a function of the parameters of the crossings; the crossed edges do not change.
 pub(super) struct Energy<'a> {
     mesh: &'a TriMesh,
     options: &'a RelaxOptions<'a>,
     closed: bool,
     /// Length of each crossed edge.
     edge: Vec<f64>,
+    /// Right end of each crossed edge, and the vector from there to its left end.
     right: Vec<DVec3>,
     along: Vec<DVec3>,
     segments: Vec<Segment>,
-    /// Fidelity of each crossing as a polynomial of its parameter.
+    /// Fidelity term of each crossing: coefficients of a quadratic polynomial of its parameter, constant first.
     fidelity: Vec<[f64; 3]>,
-    /// Where each crossing may be; one point where it is held.
-    pub bounds: Vec<(f64, f64)>,
+    /// Least and greatest parameter of each crossing; equal where it is fixed.
+    bounds: Vec<(f64, f64)>,
 }
 
 impl<'a> Energy<'a> {
-    /// Sets up the strip. `fidelity` and `bounds` have one entry per crossing.
+    /// The energy of a strip. `fidelity` and `bounds` have one entry per crossing.
     pub fn new(
         mesh: &'a TriMesh,
         options: &'a RelaxOptions<'a>,
@@ -84,7 +94,7 @@ impl<'a> Energy<'a> {
         let right: Vec<DVec3> = ends(Side::Right).collect();
         let along: Vec<DVec3> = ends(Side::Left).zip(&right).map(|(l, r)| l - *r).collect();
         let segment = |i: usize| {
-            let (entered, leaving) = (strip.entered(mesh, i), strip.nodes[strip.after(i)].halfedge);
+            let (entered, leaving) = (strip.entered(mesh, i), strip.crossings[strip.after(i)].halfedge);
             let (pivot, corner) =
                 if leaving == mesh.next(entered) { (Side::Right, leaving) } else { (Side::Left, entered) };
             let angle = mesh.corner_angle(corner).clamp(MIN_ANGLE, std::f64::consts::PI - MIN_ANGLE);
@@ -111,7 +121,7 @@ impl<'a> Energy<'a> {
         if i + 1 == self.len() { 0 } else { i + 1 }
     }
 
-    fn measure(&self, t: &[f64], j: usize) -> Measure {
+    fn measure(&self, t: &[f64], j: usize) -> SegmentMeasure {
         let (k, s) = (self.after(j), &self.segments[j]);
         let sign = if s.pivot == Side::Right { 1.0 } else { -1.0 };
         let from_pivot = |i: usize| self.edge[i] * if s.pivot == Side::Right { t[i] } else { 1.0 - t[i] };
@@ -120,7 +130,7 @@ impl<'a> Energy<'a> {
         let length = (u * u + w * w).sqrt().max(MIN_LENGTH);
         let (da, db) = (sign * self.edge[j], sign * self.edge[k]);
         let inverse = 1.0 / length;
-        Measure {
+        SegmentMeasure {
             length,
             phi: sign * w.atan2(u),
             d_length: [(a - b * s.cos) * inverse * da, (b - a * s.cos) * inverse * db],
@@ -128,8 +138,8 @@ impl<'a> Energy<'a> {
         }
     }
 
-    /// Angle of the segment to the normal of the edge it reaches.
-    fn phi_in(&self, m: &Measure, j: usize) -> f64 {
+    /// Angle of segment `j` to the normal of the edge it reaches.
+    fn arrival_angle(&self, m: &SegmentMeasure, j: usize) -> f64 {
         let s = &self.segments[j];
         m.phi + if s.pivot == Side::Right { s.angle } else { -s.angle }
     }
@@ -138,7 +148,7 @@ impl<'a> Energy<'a> {
         self.right[i] + self.along[i] * t[i]
     }
 
-    /// `q` of the segment, turned to the left by each of `turns`.
+    /// The alignment `q` of segment `j`, rotated to the left by each of the angles `turns`.
     fn alignment<const N: usize>(&self, q: &Alignment<'_>, t: &[f64], j: usize, turns: [f64; N]) -> [f64; N] {
         let tangent = (self.point(t, self.after(j)) - self.point(t, j)).normalize_or_zero();
         if tangent == DVec3::ZERO {
@@ -149,27 +159,26 @@ impl<'a> Energy<'a> {
         turns.map(|a| q(face, tangent * a.cos() + left * a.sin()))
     }
 
-    fn measures(&self, t: &[f64]) -> Vec<Measure> {
+    fn measures(&self, t: &[f64]) -> Vec<SegmentMeasure> {
         (0..self.segments.len()).map(|j| self.measure(t, j)).collect()
     }
 
-    /// The turning residual at crossing `i`, whose square is the bending there, by the segments before and
-    /// after it; at an open end by the only one.
-    fn residual(&self, measures: &[Measure], i: usize) -> Residual {
+    /// The residual `γ / √l̄` at crossing `i`, whose square is the bending there.
+    fn residual(&self, measures: &[SegmentMeasure], i: usize) -> Residual {
         let last = self.len() - 1;
         let before = if i == 0 { last } else { i - 1 };
         if !self.closed && (i == 0 || i == last) {
-            // The mirrored curve turns by 2 φ over l; half of its bending lies on this side.
+            // The curve mirrored at the boundary turns by 2 φ over length l; half of its bending counts.
             let j = if i == 0 { 0 } else { before };
             let (m, at) = (&measures[j], [j, j + 1]);
-            let phi = if i == 0 { m.phi } else { self.phi_in(m, j) };
+            let phi = if i == 0 { m.phi } else { self.arrival_angle(m, j) };
             let scale = (2.0 / m.length).sqrt();
             let r = scale * phi;
             let d = |k: usize| (at[k], scale * m.d_phi[k] - 0.5 * r / m.length * m.d_length[k]);
             return Residual { value: r, gradient: [d(0), d(1), (at[1], 0.0)] };
         }
         let (p, s) = (&measures[before], &measures[i]);
-        let gamma = s.phi - self.phi_in(p, before);
+        let gamma = s.phi - self.arrival_angle(p, before);
         let mean = 0.5 * (p.length + s.length);
         let scale = mean.sqrt().recip();
         let r = gamma * scale;
@@ -184,13 +193,13 @@ impl<'a> Energy<'a> {
         }
     }
 
-    /// The cost (8.1) of the curve, without fidelity.
+    /// The cost (8.1) of the curve, without the fidelity term.
     pub fn cost(&self, t: &[f64]) -> CurveCost {
         let measures = self.measures(t);
         let mut cost = CurveCost { length: measures.iter().map(|m| m.length).sum(), ..CurveCost::default() };
         cost.bending = (0..self.len()).map(|i| self.residual(&measures, i).value.powi(2)).sum();
         if let Some(q) = self.options.alignment {
-            let part = |(j, m): (usize, &Measure)| self.alignment(q, t, j, [0.0])[0] * m.length;
+            let part = |(j, m): (usize, &SegmentMeasure)| self.alignment(q, t, j, [0.0])[0] * m.length;
             cost.alignment = measures.iter().enumerate().map(part).sum();
         }
         cost.total = cost.length + self.options.alpha * cost.alignment + self.options.beta * cost.bending;
@@ -214,8 +223,8 @@ impl<'a> Energy<'a> {
         ((u * u + w * w).sqrt().max(MIN_LENGTH), phi, phi + sign * s.angle)
     }
 
-    /// Cost and fidelity: what is minimised. The same as [`Self::cost`] and [`Self::fidelity`], without the
-    /// derivatives, since line searches ask for nothing else.
+    /// What is minimised: the sum of [`Self::cost`] and [`Self::fidelity`]. Line searches need no derivatives, so this
+    /// computes none.
     pub fn value(&self, t: &[f64]) -> f64 {
         let n = self.segments.len();
         let (mut length, mut bending, mut alignment) = (0.0, 0.0, 0.0);
@@ -238,15 +247,14 @@ impl<'a> Energy<'a> {
         length + self.options.alpha * alignment + self.options.beta * bending + self.fidelity(t)
     }
 
-    /// The gradient at `t`; fills the Hessian.
-    fn derive(&self, t: &[f64], hessian: &mut Banded) -> Vec<f64> {
+    /// The gradient at `t`; fills the Gauss–Newton Hessian.
+    fn derivatives(&self, t: &[f64], hessian: &mut Banded) -> Vec<f64> {
         let mut gradient = vec![0.0; self.len()];
         hessian.clear();
         let measures = self.measures(t);
         for (j, m) in measures.iter().enumerate() {
             let k = self.after(j);
-            // Along a segment the length changes, across it the direction: the Hessian of the length is the
-            // square of the latter.
+            // The second derivative of the length is `l dφ dφᵀ`, up to a part that may be negative.
             let (mut by_length, mut by_phi, mut curvature) = (1.0, 0.0, m.length);
             if let Some(q) = self.options.alignment {
                 let h = ALIGNMENT_STEP;
@@ -273,31 +281,32 @@ impl<'a> Energy<'a> {
         gradient
     }
 
-    fn blocked(&self, t: &[f64], gradient: &[f64], i: usize) -> bool {
+    /// Whether crossing `i` is fixed, or at a bound beyond which the energy decreases.
+    fn is_blocked(&self, t: &[f64], gradient: &[f64], i: usize) -> bool {
         let (low, high) = self.bounds[i];
         low >= high || (t[i] <= low && gradient[i] > 0.0) || (t[i] >= high && gradient[i] < 0.0)
     }
 
-    /// Moves `t` downhill in at most `steps` steps.
-    pub fn descend(&self, t: &mut [f64], steps: usize) {
+    /// Minimises the energy from `t` in at most `steps` steps.
+    pub fn minimise(&self, t: &mut [f64], steps: usize) {
         let mut hessian = Banded::new(self.len(), self.closed);
         let mut value = self.value(t);
-        let mut damping = 1e-6;
+        let mut damping = LEAST_DAMPING;
         for _ in 0..steps {
-            let gradient = self.derive(t, &mut hessian);
-            let free: Vec<bool> = (0..self.len()).map(|i| !self.blocked(t, &gradient, i)).collect();
+            let gradient = self.derivatives(t, &mut hessian);
+            let free: Vec<bool> = (0..self.len()).map(|i| !self.is_blocked(t, &gradient, i)).collect();
             let downhill: Vec<f64> = gradient.iter().map(|g| -g).collect();
             let step = hessian.solve(&downhill, &free, damping);
-            let better = step.and_then(|step| self.search(t, value, &gradient, &step));
+            let better = step.and_then(|step| self.line_search(t, value, &gradient, &step));
             let Some((next, next_value)) = better else {
-                // A bad model: lean towards the gradient.
-                damping = (damping * 30.0).max(1e-3);
-                if damping > 1e4 {
+                // The quadratic model is poor here: a larger damping turns the step towards the negative gradient.
+                damping = (damping * DAMPING_INCREASE).max(LEAST_RAISED_DAMPING);
+                if damping > MOST_DAMPING {
                     break;
                 }
                 continue;
             };
-            damping = (damping * 0.1).max(1e-6);
+            damping = (damping * DAMPING_DECREASE).max(LEAST_DAMPING);
             t.copy_from_slice(&next);
             let gain = value - next_value;
             value = next_value;
@@ -307,15 +316,15 @@ impl<'a> Energy<'a> {
         }
     }
 
-    /// The first of ever smaller parts of `step`, cut off at the bounds, that gains enough.
-    fn search(&self, t: &[f64], value: f64, gradient: &[f64], step: &[f64]) -> Option<(Vec<f64>, f64)> {
+    /// Backtracking along `step`, projected to the bounds: the first point that satisfies the Armijo condition.
+    fn line_search(&self, t: &[f64], value: f64, gradient: &[f64], step: &[f64]) -> Option<(Vec<f64>, f64)> {
         let mut scale = 1.0;
-        for _ in 0..HALVINGS {
+        for _ in 0..STEP_SIZES {
             let next: Vec<f64> =
                 (0..t.len()).map(|i| (t[i] + scale * step[i]).clamp(self.bounds[i].0, self.bounds[i].1)).collect();
-            let promised: f64 = (0..t.len()).map(|i| gradient[i] * (next[i] - t[i])).sum();
+            let predicted: f64 = (0..t.len()).map(|i| gradient[i] * (next[i] - t[i])).sum();
             let next_value = self.value(&next);
-            if promised < 0.0 && next_value < value + ARMIJO * promised {
+            if predicted < 0.0 && next_value < value + ARMIJO * predicted {
                 return Some((next, next_value));
             }
             scale *= 0.5;
@@ -323,14 +332,14 @@ impl<'a> Energy<'a> {
         None
     }
 
-    /// How hard each crossing pushes against the end of its edge it is blocked at (negative: the right one);
-    /// 0 where it is free or held.
-    pub fn pushes(&self, t: &[f64]) -> Vec<f64> {
-        let gradient = self.derive(t, &mut Banded::new(self.len(), self.closed));
-        let push = |i: usize| {
-            if self.bounds[i].0 < self.bounds[i].1 && self.blocked(t, &gradient, i) { -gradient[i] } else { 0.0 }
+    /// For each crossing at a bound the negative gradient, which points beyond the bound (negative: to the right); 0
+    /// for free and fixed crossings.
+    pub fn bound_forces(&self, t: &[f64]) -> Vec<f64> {
+        let gradient = self.derivatives(t, &mut Banded::new(self.len(), self.closed));
+        let force = |i: usize| {
+            if self.bounds[i].0 < self.bounds[i].1 && self.is_blocked(t, &gradient, i) { -gradient[i] } else { 0.0 }
         };
-        (0..self.len()).map(push).collect()
+        (0..self.len()).map(force).collect()
     }
 }
 
@@ -342,26 +351,26 @@ struct Residual {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{cylinder, ring};
     use super::*;
+    use crate::surface::testing::{cylinder, ring, upright};
 
     #[test]
-    fn the_gradient_is_that_of_the_value() {
+    fn the_gradient_agrees_with_finite_differences() {
         let mesh = cylinder(14, 9, 0.2);
         for closed in [true, false] {
             let q = |_: FaceId, d: DVec3| (d.z * d.z - 0.2 * d.x * d.y).powi(2);
             let options = RelaxOptions { alignment: Some(&q), ..RelaxOptions::default() };
-            let curve = if closed { ring(&mesh, 14, 4, 0.3) } else { super::super::testing::upright(&mesh, 14, 9, 5) };
+            let curve = if closed { ring(&mesh, 14, 4, 0.3) } else { upright(&mesh, 14, 9, 5) };
             assert_eq!(curve.check(&mesh), Ok(()));
             let strip = TriangleStrip::new(&curve);
             let n = strip.len();
             let fidelity = (0..n).map(|i| [0.1, 0.2 * i as f64 / n as f64, 0.5]).collect();
             let energy = Energy::new(&mesh, &options, &strip, fidelity, vec![(0.03, 0.97); n]);
-            let t: Vec<f64> = strip.nodes.iter().map(|n| n.t).collect();
+            let t: Vec<f64> = strip.crossings.iter().map(|n| n.t).collect();
             let sum = energy.cost(&t).total + energy.fidelity(&t);
             assert!((energy.value(&t) - sum).abs() < 1e-12 * sum);
             assert!((energy.cost(&t).length - curve.length(&mesh)).abs() < 1e-12);
-            let gradient = energy.derive(&t, &mut Banded::new(n, closed));
+            let gradient = energy.derivatives(&t, &mut Banded::new(n, closed));
             for i in 0..n {
                 let at = |d: f64| {
                     let mut t = t.clone();

@@ -1,5 +1,18 @@
-use super::testing::{Random, class_numbers, cylinder, dual_cycle, geodesic_polygon, real_mesh, ring, torus, upright};
-use super::*;
+//! Tests of the relaxation as a whole.
+
+use glam::DVec3;
+
+use super::options::{RelaxError, RelaxOptions, Relaxed};
+use super::relaxation::{curve_cost, relax};
+use super::triangle_strip::TriangleStrip;
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::progress::{Cancelled, Progress};
+use crate::surface::curve::SurfaceCurve;
+use crate::surface::point::SurfacePoint;
+use crate::surface::testing::{
+    Random, cylinder, dual_cycle, geodesic_polygon, homology_numbers, real_mesh, ring, torus, upright,
+};
+use crate::surface::vertex_fan::Side;
 
 fn relaxed(mesh: &TriMesh, curve: &SurfaceCurve, options: &RelaxOptions<'_>) -> Relaxed {
     let result = relax(mesh, curve, options, &Progress::new()).unwrap();
@@ -21,17 +34,17 @@ fn a_noisy_ring_of_a_cylinder_becomes_straight() {
     assert!(result.after.bending < 1e-2 * result.before.bending, "{result:?}");
     // A straight ring is as long as the polygonal cylinder is round.
     assert!(result.after.length < 1.002 * 0.5 * std::f64::consts::PI, "{result:?}");
-    assert_eq!(class_numbers(&mesh, &curve, 60), class_numbers(&mesh, &result.curve, 60));
+    assert_eq!(homology_numbers(&mesh, &curve, 60), homology_numbers(&mesh, &result.curve, 60));
 }
 
 #[test]
-fn a_noisy_ring_of_a_torus_keeps_class_and_place() {
+fn a_noisy_ring_of_a_torus_keeps_its_class_and_place() {
     let mesh = torus(48, 20, 0.2);
     for row in 0..20 {
         let curve = ring(&mesh, 48, row, 0.45);
         let result = relaxed(&mesh, &curve, &RelaxOptions::default());
         assert!(result.after.bending < 0.2 * result.before.bending, "row {row}: {result:?}");
-        assert_eq!(class_numbers(&mesh, &curve, 60), class_numbers(&mesh, &result.curve, 60));
+        assert_eq!(homology_numbers(&mesh, &curve, 60), homology_numbers(&mesh, &result.curve, 60));
     }
 }
 
@@ -51,11 +64,11 @@ fn an_open_curve_meets_the_boundary_orthogonally() {
 fn the_ends_of_a_slanted_curve_slide_over_boundary_vertices() {
     let mesh = cylinder(60, 12, 0.1);
     let strip = upright(&mesh, 60, 12, 9);
-    // The same way up, but with both ends led a boundary vertex to the sides.
+    // The same curve with each end passed over a boundary vertex, to opposite sides.
     let mut slanted = TriangleStrip::new(&strip);
     for (i, side) in [(0, Side::Left), (slanted.len() - 1, Side::Right)] {
         let run = slanted.run(&mesh, i, side).unwrap();
-        assert!(slanted.pass(&mesh, run, side, 0.3));
+        assert!(slanted.pass_vertex(&mesh, run, side, 0.3));
     }
     let curve = slanted.curve();
     let options = RelaxOptions { tube: 4.0, ..RelaxOptions::default() };
@@ -65,7 +78,7 @@ fn the_ends_of_a_slanted_curve_slide_over_boundary_vertices() {
 }
 
 #[test]
-fn a_curve_passes_the_points_it_is_drawn_through() {
+fn a_curve_passes_its_waypoints() {
     let mesh = cylinder(40, 22, 0.25);
     let curve = ring(&mesh, 40, 10, 0.4);
     let free = relaxed(&mesh, &curve, &RelaxOptions::default());
@@ -74,19 +87,19 @@ fn a_curve_passes_the_points_it_is_drawn_through() {
         points.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min)
     };
     for i in [17, 50] {
-        // Some way off the curve, in the tube.
+        // A point off the curve, in the tube.
         let face = mesh.face(curve.crossings[i].halfedge);
         let at = SurfacePoint { face, weights: [0.05, 0.05, 0.9] };
         let p = at.position(&mesh);
-        let drawn = relaxed(&mesh, &curve, &RelaxOptions { waypoints: vec![at], ..RelaxOptions::default() });
-        let (before, after) = (distance(&free.curve, p), distance(&drawn.curve, p));
+        let guided = relaxed(&mesh, &curve, &RelaxOptions { waypoints: vec![at], ..RelaxOptions::default() });
+        let (before, after) = (distance(&free.curve, p), distance(&guided.curve, p));
         assert!(after < 0.5 * before, "{before} {after}");
-        assert!(drawn.after.total < 1.2 * free.after.total, "{} {}", drawn.after.total, free.after.total);
+        assert!(guided.after.total < 1.2 * free.after.total, "{} {}", guided.after.total, free.after.total);
     }
 }
 
 #[test]
-fn alignment_turns_the_curve() {
+fn a_curve_is_relaxed_towards_its_alignment() {
     let mesh = cylinder(40, 22, 0.25);
     let curve = ring(&mesh, 40, 10, 0.4);
     let q = |_: FaceId, d: DVec3| 10.0 * (1.0 - d.z.abs());
@@ -96,7 +109,7 @@ fn alignment_turns_the_curve() {
 }
 
 #[test]
-fn cancelling_is_heard() {
+fn relaxation_can_be_cancelled() {
     let mesh = cylinder(12, 6, 0.0);
     let progress = Progress::new();
     progress.cancel();
@@ -109,21 +122,18 @@ fn random_curves_on_real_meshes_keep_their_class() {
     for file in
         ["rockerarm_5k.obj", "fertility_13k.off", "cino_3holes.obj", "half_torus.obj", "cad_upright_slivers.off"]
     {
-        let Some(mesh) = real_mesh(file) else {
-            eprintln!("no mesh {file}: skipped");
-            continue;
-        };
+        let Some(mesh) = real_mesh(file) else { continue };
         let mut random = Random(42);
         for curve in (0..12).filter_map(|_| dual_cycle(&mesh, &mut random)) {
             let result = relaxed(&mesh, &curve, &RelaxOptions::default());
             assert!(result.after.bending < 0.7 * result.before.bending, "{file}: {result:?}");
-            assert_eq!(class_numbers(&mesh, &curve, 40), class_numbers(&mesh, &result.curve, 40));
+            assert_eq!(homology_numbers(&mesh, &curve, 40), homology_numbers(&mesh, &result.curve, 40));
         }
     }
 }
 
 #[test]
-fn relaxing_again_changes_little_and_repeats_exactly() {
+fn relaxation_is_deterministic_and_nearly_idempotent() {
     let mesh = torus(48, 20, 0.2);
     let curve = geodesic_polygon(&mesh, &zigzag(48, 20, 3));
     let first = relaxed(&mesh, &curve, &RelaxOptions::default());
@@ -134,7 +144,7 @@ fn relaxing_again_changes_little_and_repeats_exactly() {
 }
 
 #[test]
-fn senseless_limits_are_refused() {
+fn a_vertex_distance_out_of_range_is_refused() {
     let mesh = cylinder(12, 6, 0.0);
     for t_min in [0.0, 0.5, f64::NAN] {
         let options = RelaxOptions { t_min, ..RelaxOptions::default() };
@@ -143,19 +153,19 @@ fn senseless_limits_are_refused() {
     }
 }
 
-/// Every fourth vertex of a row of a torus, by turns a row up and down.
+/// Every fourth vertex of a torus, alternating between two neighbouring rows.
 fn zigzag(nu: usize, nv: usize, row: usize) -> Vec<VertexId> {
     (0..nu / 4).map(|k| VertexId::new((row + nv + k % 2) % nv * nu + 4 * k)).collect()
 }
 
 #[test]
-fn a_polygon_of_geodesics_becomes_fair() {
+fn a_polygon_of_geodesics_becomes_smooth() {
     let mesh = torus(48, 20, 0.2);
     for row in 0..20 {
         let curve = geodesic_polygon(&mesh, &zigzag(48, 20, row));
         let result = relaxed(&mesh, &curve, &RelaxOptions::default());
-        // The row is curved itself, except the innermost, the outermost and nearly so those next to them.
+        // Rows other than the innermost and the outermost have geodesic curvature themselves.
         assert!(result.after.bending < 0.1 * result.before.bending, "row {row}: {result:?}");
-        assert_eq!(class_numbers(&mesh, &curve, 60), class_numbers(&mesh, &result.curve, 60));
+        assert_eq!(homology_numbers(&mesh, &curve, 60), homology_numbers(&mesh, &result.curve, 60));
     }
 }

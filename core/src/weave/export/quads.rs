@@ -1,4 +1,7 @@
-//! The quads of an embedded layout: refined, brought to the surface and smoothed.
+//! The quads of an embedded layout: refined, projected to the surface and smoothed.
+//!
+//! On a surface with features, vertices of quads on features are fixed while the others are smoothed. Where that leaves a
+//! quad nearly flat, the vertices around it are released, and the smoothing starts again.
 
 use glam::DVec3;
 
@@ -12,71 +15,73 @@ use crate::quad::{
 };
 use crate::surface::{SurfacePoint, nearest_in_triangle};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::EmbeddingInput;
+use crate::weave::export::input::EmbeddingInput;
 
-/// How near to a sharp edge a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the width that can be
-/// seen.
+/// Distance from a sharp edge up to which a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the width
+/// that can be seen.
 const ON_FEATURE: f64 = 1e-4;
-/// Scaled Jacobian below which a quad is flat, how often those are let go that hold such a quad, and how many rings of
-/// quads around.
+/// Scaled Jacobian below which a quad releases the fixed vertices around it. Chosen by hand.
 const FLAT: f64 = 0.3;
+/// Number of times that vertices are released, at most. Chosen by hand.
 const RELEASES: usize = 3;
+/// Rings of quads around a flat quad whose vertices are released. Chosen by hand.
 const RELEASED_RINGS: usize = 2;
-/// Vertices in a row on a feature from which on quads resolve it.
+/// Number of connected vertices on a feature from which on the quads resolve the feature. Chosen by hand.
 const RESOLVED: usize = 8;
 
-/// The refinement of an embedded layout, on the surface.
-pub(in crate::weave) fn quads(
-    sketch: &EmbeddingInput<'_>,
+/// The refinement of an embedded layout on the design mesh.
+pub(super) fn quads(
+    input: &EmbeddingInput<'_>,
     (layout, embedding, maps): (&QuadLayout, &Embedding, &[PatchMap]),
     optimised: bool,
-    stops: &Spacing,
+    spacing: &Spacing,
     progress: &Progress,
 ) -> Result<QuadMesh, WeaveError> {
-    let surface = sketch.surface;
+    let surface = input.surface;
     progress.report("Refining to quads", 0.97);
-    let mut quads = refine(layout, embedding, maps, stops);
-    if optimised || sketch.proxy.is_some() {
+    let mut quads = refine(layout, embedding, maps, spacing);
+    if optimised || input.proxy.is_some() {
         project(&mut quads, surface.mesh);
     }
-    let mesh = match sketch.proxy {
+    let mesh = match input.proxy {
         Some((proxy, original)) => {
-            carry(&mut quads, proxy, original);
+            transfer_to_original(&mut quads, proxy, original);
             project(&mut quads, original);
             original
         }
         None => surface.mesh,
     };
-    // What is aligned to features stays there; on a proxy it is not known where those of the mesh are.
+    // Vertices on features stay there. The positions of features are known on the design mesh only, so on a proxy with
+    // features nothing is smoothed unless a quad is folded.
     let aligned = optimised && surface.sharp.contains(&true);
-    if !aligned || sketch.proxy.is_none() || quality(&quads).0 > 0 {
-        let mut held = if aligned && sketch.proxy.is_none() { on_features(&quads, &surface) } else { Vec::new() };
+    if !aligned || input.proxy.is_none() || quality(&quads).0 > 0 {
+        let mut fixed = if aligned && input.proxy.is_none() { on_features(&quads, &surface) } else { Vec::new() };
         let refined = quads.clone();
-        smooth(&mut quads, mesh, &held, progress)?;
-        // A flat or folded quad is worse than a vertex beside its feature.
+        smooth(&mut quads, mesh, &fixed, progress)?;
+        // A flat or folded quad is worse than a vertex off its feature.
         for _ in 0..RELEASES {
             let is_corner = |v: usize| is_corner(quads.positions[v], quads.base_face[v], &surface);
-            if !release(&quads, is_corner, &mut held) {
+            if !release(&quads, is_corner, &mut fixed) {
                 break;
             }
             quads.clone_from(&refined);
-            smooth(&mut quads, mesh, &held, progress)?;
+            smooth(&mut quads, mesh, &fixed, progress)?;
         }
         let on_feature = |p, f| is_on_feature(p, f, &surface);
-        repair_locally(&mut quads, mesh, &FeatureConstraint { vertices: &held, on_feature: &on_feature }, progress)?;
+        repair_locally(&mut quads, mesh, &FeatureConstraint { vertices: &fixed, on_feature: &on_feature }, progress)?;
     }
     Ok(quads)
 }
 
-/// For each vertex of quads on a surface whether it is to stay on the feature that it lies on.
+/// For each vertex of the quads whether it is fixed on the feature that it lies on.
 fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
     let places = quads.positions.iter().zip(&quads.base_face);
     let on: Vec<bool> = places.map(|(&p, &f)| is_on_feature(p, f, surface)).collect();
     resolved(&on, &quads.quads)
 }
 
-/// Which of the vertices on features are in rows along sides of quads, long enough to be seen: what lies there by chance, or
-/// on a crease too short for the quads, is not.
+/// Those vertices on features that belong to a group of [`RESOLVED`] or more, connected by sides of quads. Others lie there by
+/// chance, or on a crease too short for the quads.
 fn resolved(on: &[bool], quads: &[[u32; 4]]) -> Vec<bool> {
     let mut along = vec![Vec::new(); on.len()];
     for [a, b] in quads.iter().flat_map(|q| (0..4).map(|k| [q[k], q[(k + 1) % 4]])) {
@@ -85,7 +90,7 @@ fn resolved(on: &[bool], quads: &[[u32; 4]]) -> Vec<bool> {
             along[b as usize].push(a);
         }
     }
-    let mut held = vec![false; on.len()];
+    let mut fixed = vec![false; on.len()];
     let mut seen: Vec<bool> = on.iter().map(|on| !on).collect();
     for first in 0..on.len() {
         if std::mem::replace(&mut seen[first], true) {
@@ -98,15 +103,15 @@ fn resolved(on: &[bool], quads: &[[u32; 4]]) -> Vec<bool> {
             row.extend(along[v as usize].iter().filter(|&&w| !std::mem::replace(&mut seen[w as usize], true)));
         }
         if row.len() >= RESOLVED {
-            row.iter().for_each(|&v| held[v as usize] = true);
+            row.iter().for_each(|&v| fixed[v as usize] = true);
         }
     }
-    held
+    fixed
 }
 
-/// Lets the vertices of flat and folded quads go that are held on features, and those next to them, but for corners of
-/// features; tells whether there are any.
-fn release(quads: &QuadMesh, is_corner: impl Fn(usize) -> bool, held: &mut [bool]) -> bool {
+/// Releases the fixed vertices of flat and folded quads and of the rings around them, except corners of features; returns
+/// whether there are any.
+fn release(quads: &QuadMesh, is_corner: impl Fn(usize) -> bool, fixed: &mut [bool]) -> bool {
     let flat = scaled_jacobians(quads).into_iter().zip(&quads.quads).filter(|(s, _)| *s < FLAT);
     let mut near = vec![false; quads.positions.len()];
     flat.flat_map(|(_, q)| q).for_each(|&v| near[v as usize] = true);
@@ -116,15 +121,15 @@ fn release(quads: &QuadMesh, is_corner: impl Fn(usize) -> bool, held: &mut [bool
         ring.into_iter().for_each(|v| near[v as usize] = true);
     }
     let mut any = false;
-    for (v, held) in held.iter_mut().enumerate().filter(|(v, _)| near[*v]) {
-        if *held && !is_corner(v) {
-            (*held, any) = (false, true);
+    for (v, fixed) in fixed.iter_mut().enumerate().filter(|(v, _)| near[*v]) {
+        if *fixed && !is_corner(v) {
+            (*fixed, any) = (false, true);
         }
     }
     any
 }
 
-/// Whether a place in a triangle is that of a vertex at which features meet or end.
+/// Whether a point in triangle `f` is a vertex at which features meet or end.
 fn is_corner(p: DVec3, f: u32, surface: &Surface<'_>) -> bool {
     let mesh = surface.mesh;
     let rays = |v| mesh.outgoing(v).filter(|&h| surface.sharp[mesh.edge(h).index()]).count();
@@ -132,7 +137,7 @@ fn is_corner(p: DVec3, f: u32, surface: &Surface<'_>) -> bool {
     near.into_iter().any(|v| rays(v) != 2)
 }
 
-/// Whether a place in a triangle lies on a sharp edge of it or of its neighbours.
+/// Whether a point in triangle `f` lies on a sharp edge at one of the triangle's corners.
 fn is_on_feature(p: DVec3, f: u32, surface: &Surface<'_>) -> bool {
     let mesh = surface.mesh;
     let around = mesh.face_vertices(FaceId(f)).into_iter().flat_map(|v| mesh.outgoing(v));
@@ -143,8 +148,8 @@ fn is_on_feature(p: DVec3, f: u32, surface: &Surface<'_>) -> bool {
     })
 }
 
-/// Carries quads from the proxy to the mesh it stands for.
-fn carry(quads: &mut QuadMesh, proxy: &Proxy, original: &TriMesh) {
+/// Transfers the vertices of quads from the proxy to the original mesh.
+fn transfer_to_original(quads: &mut QuadMesh, proxy: &Proxy, original: &TriMesh) {
     let mesh = proxy.mesh();
     for (position, face) in quads.positions.iter_mut().zip(&mut quads.base_face) {
         let corners = mesh.face_vertices(FaceId(*face)).map(|v| mesh.position(v));
@@ -179,26 +184,26 @@ mod tests {
     }
 
     #[test]
-    fn long_rows_on_features_are_held_and_short_ones_and_single_vertices_not() {
+    fn long_rows_on_features_are_fixed_and_short_ones_and_single_vertices_are_not() {
         let mesh = grid(10);
         let mut on = vec![false; 100];
         (0..10).for_each(|k| on[30 + k] = true);
         (0..4).for_each(|k| on[70 + k] = true);
         on[95] = true;
-        let held = resolved(&on, &mesh.quads);
-        assert!((0..100).all(|v| held[v] == (30..40).contains(&v)));
+        let fixed = resolved(&on, &mesh.quads);
+        assert!((0..100).all(|v| fixed[v] == (30..40).contains(&v)));
     }
 
     #[test]
-    fn vertices_of_a_flat_quad_are_let_go_but_for_corners() {
+    fn vertices_of_a_flat_quad_are_released_except_corners() {
         let mut mesh = grid(10);
-        let mut held: Vec<bool> = (0..100).map(|v| v / 10 == 5).collect();
-        let before = held.clone();
-        assert!(!release(&mesh, |_| false, &mut held));
-        assert_eq!(held, before);
+        let mut fixed: Vec<bool> = (0..100).map(|v| v / 10 == 5).collect();
+        let before = fixed.clone();
+        assert!(!release(&mesh, |_| false, &mut fixed));
+        assert_eq!(fixed, before);
         // One corner on the line between its neighbours.
         mesh.positions[54] = 0.5 * (mesh.positions[44] + mesh.positions[55]);
-        assert!(release(&mesh, |v| v == 53, &mut held));
-        assert!(!held[54] && !held[52] && held[53] && held[50] && held[59]);
+        assert!(release(&mesh, |v| v == 53, &mut fixed));
+        assert!(!fixed[54] && !fixed[52] && fixed[53] && fixed[50] && fixed[59]);
     }
 }

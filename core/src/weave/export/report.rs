@@ -1,4 +1,4 @@
-//! `report.json`: what was woven, what layout came of it, how good its embedding is.
+//! `report.json`: what was woven, which layout it has, how good its embedding is.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -8,44 +8,15 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::dual::{Colour, RegionReport};
-use crate::embed::{CollapsedChord, FeatureEdges, Measures, Surface, UncollapsedChord, measure_patches};
-use crate::layout::{Embedding, PatchMap};
+use crate::embed::{CollapsedChord, EmbeddingReport, Measures, PatchMeasures, UncollapsedChord, measure_patches};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
 use crate::quad::{quality, resampling_error};
-use crate::surface::PrincipalCurvature;
-use crate::surface::face_curvature;
 use crate::weave::design::Strip;
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::{Export, write_file};
+use crate::weave::export::files::write_file;
+use crate::weave::export::result::{Export, Times};
 use crate::weave::mesh_role::MeshRole;
-use crate::weave::proposal::ElasticEnergy;
 use crate::weave::session::Session;
-
-/// Seconds by the name of what took them.
-pub type Times = BTreeMap<String, f64>;
-
-/// A drawing before it was optimised.
-#[derive(Debug, Clone)]
-pub struct Before {
-    /// The drawing.
-    pub initial_embedding: Embedding,
-    /// Its measures, with patches mapped one by one; `None` where that cannot be done.
-    pub measures: Option<Measures>,
-    /// Principal curvatures of the triangles of the surface.
-    pub(in crate::weave) bending: Vec<PrincipalCurvature>,
-}
-
-impl Before {
-    pub(in crate::weave) fn new(
-        initial_embedding: &Embedding,
-        maps: Option<&[PatchMap]>,
-        surface: &Surface<'_>,
-    ) -> Self {
-        let bending = face_curvature(surface.mesh, surface.curvature, |_| true);
-        let measures = maps.map(|maps| measure_patches(maps, &bending).0);
-        Self { initial_embedding: initial_embedding.clone(), measures, bending }
-    }
-}
 
 /// What a report is about.
 #[derive(Clone, Copy)]
@@ -65,8 +36,9 @@ struct Report<'a> {
     components: usize,
     #[serde(flatten)]
     weaving: Option<Weaving<'a>>,
-    layout: Option<LayoutReport>,
-    problem: Option<String>,
+    layout: Option<LayoutSection>,
+    /// Why there is no layout.
+    error: Option<String>,
     valid: bool,
     seconds: Times,
 }
@@ -75,7 +47,7 @@ struct Report<'a> {
 struct Weaving<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     proxy: Option<ProxySection>,
-    strips: Vec<StripReport>,
+    strips: Vec<StripSection>,
     crossings: usize,
     regions: &'a [RegionReport],
     colours: Colours,
@@ -85,11 +57,11 @@ struct Weaving<'a> {
 #[derive(Serialize)]
 struct ProxySection {
     triangles: usize,
-    /// Whether the layout, too, is embedded on the proxy, and its quads were then carried to the mesh.
-    embedded: bool,
+    /// Whether the layout is embedded on the proxy, and its quads are transferred to the design mesh.
+    layout_on_proxy: bool,
 }
 
-/// Counts of one colour.
+/// Numbers of regions by colour.
 #[derive(Serialize)]
 struct Colours {
     red: usize,
@@ -97,70 +69,104 @@ struct Colours {
     yellow: usize,
 }
 
+/// A strip. Its length is in units of the file.
 #[derive(Serialize)]
-struct StripReport {
+struct StripSection {
     id: u32,
     closed: bool,
     length: f64,
-    cost: f64,
-    energy: Option<ElasticEnergy>,
+    elastica_cost: f64,
+    energy: Option<EnergySection>,
 }
 
 #[derive(Serialize)]
-struct LayoutReport {
+struct EnergySection {
+    found: f64,
+    relaxed: f64,
+}
+
+#[derive(Serialize)]
+struct LayoutSection {
     nodes: usize,
     arcs: usize,
     patches: usize,
     chords: usize,
-    irregular: usize,
+    irregular_nodes: usize,
+    /// Number of irregular nodes of each valence.
     valences: BTreeMap<usize, usize>,
-    euler: i64,
+    euler_characteristic: i64,
     quads: usize,
     folded_quads: usize,
     mean_scaled_jacobian: f64,
-    /// How far quads are from the surface at most, as a fraction of the diagonal of its bounding box.
-    farthest_quad: f64,
+    /// Distance between the quads and the surface, as a fraction of the diagonal of its bounding box.
+    hausdorff_distance: f64,
     flipped_triangles: usize,
     embedding: EmbeddingSection,
     checks: Checks,
 }
 
-/// How good the embedding is. Energies are relative to the surface's area, and so to its size.
+/// The quality of the embedding. Energies are relative to the area of the surface.
 #[derive(Serialize)]
 struct EmbeddingSection {
-    /// Whether this is the optimised embedding, not the drawing.
+    /// Whether this is the optimised embedding, not the initial one.
     optimised: bool,
     /// Why the optimisation failed.
-    problem: Option<String>,
+    error: Option<String>,
     #[serde(flatten)]
-    course: Option<Course>,
+    optimisation: Option<OptimisationSection>,
     #[serde(flatten)]
-    measures: Measures,
-    /// The measures of the drawing.
-    before: Option<Measures>,
+    measures: MeasuresSection,
+    /// The measures of the initial embedding.
+    initial: Option<MeasuresSection>,
     patches: Vec<PatchSection>,
 }
 
-/// The course of the optimisation.
+/// The course of the optimisation. Lengths and positions are in units of the file.
 #[derive(Serialize)]
-struct Course {
+struct OptimisationSection {
     steps: usize,
     energy_before: f64,
     energy_after: f64,
-    flipped_before: usize,
-    flipped_at_rest: usize,
-    folds: Vec<FoldSection>,
-    /// Chords that were collapsed, in order, and those that were to be and could not be.
-    collapsed: Vec<CollapsedChord>,
-    short: Vec<UncollapsedChord>,
-    /// Edges of features, and which of them do not lie on isolines.
-    features: FeatureEdges,
+    flipped_initially: usize,
+    flipped_after_least_squares: usize,
+    remaining_flipped_triangles: Vec<FlippedTriangle>,
+    /// Chords that were collapsed, in order.
+    collapsed_chords: Vec<CollapsedChord>,
+    /// Chords that are shorter than asked for and could not be collapsed.
+    uncollapsed_chords: Vec<UncollapsedChord>,
+    feature_edges: FeatureEdgesSection,
 }
 
 #[derive(Serialize)]
-struct FoldSection {
+struct FlippedTriangle {
     at: [f64; 3],
     reason: String,
+}
+
+/// Sharp edges of the mesh that the layout is embedded on.
+#[derive(Serialize)]
+struct FeatureEdgesSection {
+    total: usize,
+    on_isolines: usize,
+    /// The ends of the edges that are not on isolines.
+    off_isolines: Vec<[[f64; 3]; 2]>,
+}
+
+/// The measures of Campen, section 6.8.1.
+#[derive(Serialize)]
+struct MeasuresSection {
+    /// Mean conformal distortion, 2 at best.
+    conformal: f64,
+    /// Conjugacy error, 0 at best.
+    planar: f64,
+    /// Mean deviation from principal directions, in degrees.
+    alignment: f64,
+    /// Largest conformal distortion of a triangle.
+    max_conformal: f64,
+    /// Number of triangles that are flipped or have no area in the map.
+    flipped: usize,
+    /// Number of triangles whose distortion is clamped to the largest value that counts.
+    clamped: usize,
 }
 
 #[derive(Serialize)]
@@ -168,20 +174,20 @@ struct PatchSection {
     aspect: f64,
     area: f64,
     #[serde(flatten)]
-    measures: Measures,
+    measures: MeasuresSection,
 }
 
-/// What was checked of a finished layout.
+/// Checks of a finished layout.
 #[derive(Serialize)]
 struct Checks {
     /// Nodes, arcs and patches add up to the Euler characteristic, and sides join corners.
     structure: bool,
     /// Every patch is a disc with four sides on the surface.
     patches_are_discs: bool,
-    /// No map of a patch turns a triangle over.
-    maps_are_one_to_one: bool,
+    /// No patch map flips a triangle.
+    maps_are_injective: bool,
     /// No quad of the refinement is folded.
-    quads_are_unfolded: bool,
+    no_folded_quads: bool,
 }
 
 /// Writes `report.json` of a layout on `mesh`, or of why there is none.
@@ -195,7 +201,7 @@ pub(in crate::weave) fn write_report(
     let (loaded, topology, weaving) = match subject {
         Subject::Session(session) => {
             let on_proxy = result.as_ref().is_ok_and(|e| e.mesh_role == MeshRole::Proxy);
-            (&session.model().loaded, &session.model().topology, Some(weaving_report(session, on_proxy)))
+            (&session.model().loaded, &session.model().topology, Some(weaving(session, on_proxy)))
         }
         Subject::File(loaded, topology) => (loaded, topology, None),
     };
@@ -209,8 +215,8 @@ pub(in crate::weave) fn write_report(
         boundary_loops: topology.boundary_loops.len(),
         components: topology.components.len(),
         weaving,
-        layout: result.as_ref().ok().map(|e| layout_report(e, loaded)),
-        problem: result.as_ref().err().map(ToString::to_string),
+        layout: result.as_ref().ok().map(|e| layout_section(e, loaded)),
+        error: result.as_ref().err().map(ToString::to_string),
         valid: result.is_ok(),
         seconds,
     };
@@ -218,18 +224,18 @@ pub(in crate::weave) fn write_report(
     write_file(&folder.join("report.json"), |out| writeln!(out, "{text}"))
 }
 
-fn weaving_report(session: &Session, embedded: bool) -> Weaving<'_> {
+fn weaving(session: &Session, layout_on_proxy: bool) -> Weaving<'_> {
     let (model, woven) = (session.model(), session.woven());
     let scale = model.loaded.units.scale;
-    let strip = |s: &Strip| StripReport {
+    let strip = |s: &Strip| StripSection {
         id: s.id.0,
         closed: s.curve.closed,
         length: s.curve.length(&model.loaded.mesh) * scale,
-        cost: s.cost,
-        energy: s.energy,
+        elastica_cost: s.cost,
+        energy: s.energy.map(|e| EnergySection { found: e.found, relaxed: e.relaxed }),
     };
     Weaving {
-        proxy: model.proxy.as_ref().map(|p| ProxySection { triangles: p.mesh().n_faces(), embedded }),
+        proxy: model.proxy.as_ref().map(|p| ProxySection { triangles: p.mesh().n_faces(), layout_on_proxy }),
         strips: session.design().strips.iter().map(strip).collect(),
         crossings: woven.arrangement.crossings.len(),
         regions: &woven.reports,
@@ -241,8 +247,8 @@ fn weaving_report(session: &Session, embedded: bool) -> Weaving<'_> {
     }
 }
 
-fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
-    let euler = loaded.mesh.euler_characteristic();
+fn layout_section(e: &Export, loaded: &LoadedMesh) -> LayoutSection {
+    let euler_characteristic = loaded.mesh.euler_characteristic();
     let mut valences = BTreeMap::new();
     for n in e.layout.nodes.iter().filter(|n| !n.is_regular()) {
         *valences.entry(n.valence).or_insert(0) += 1;
@@ -250,23 +256,23 @@ fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
     let (folded_quads, mean_scaled_jacobian) = quality(&e.quads);
     let flipped_triangles = e.maps.iter().map(|m| m.flipped).sum();
     let checks = Checks {
-        structure: e.layout.check(euler).is_ok(),
+        structure: e.layout.check(euler_characteristic).is_ok(),
         patches_are_discs: e.maps.iter().all(|m| m.mesh.euler_characteristic() == 1),
-        maps_are_one_to_one: flipped_triangles == 0,
-        quads_are_unfolded: folded_quads == 0,
+        maps_are_injective: flipped_triangles == 0,
+        no_folded_quads: folded_quads == 0,
     };
-    LayoutReport {
+    LayoutSection {
         nodes: e.layout.nodes.len(),
         arcs: e.layout.arcs.len(),
         patches: e.layout.patches.len(),
         chords: e.layout.chords,
-        irregular: e.layout.n_irregular(),
+        irregular_nodes: e.layout.n_irregular(),
         valences,
-        euler,
+        euler_characteristic,
         quads: e.quads.quads.len(),
         folded_quads,
         mean_scaled_jacobian,
-        farthest_quad: resampling_error(&e.quads, &loaded.mesh),
+        hausdorff_distance: resampling_error(&e.quads, &loaded.mesh),
         flipped_triangles,
         embedding: embedding_section(e, loaded),
         checks,
@@ -274,44 +280,59 @@ fn layout_report(e: &Export, loaded: &LoadedMesh) -> LayoutReport {
 }
 
 fn embedding_section(e: &Export, loaded: &LoadedMesh) -> EmbeddingSection {
-    let (measures, patches, _) = measure_patches(&e.maps, &e.before.bending);
-    let done = e.optimised.as_ref().and_then(|result| result.as_ref().ok());
-    let scale = loaded.units.scale;
-    let in_file = |at: [f64; 3]| loaded.units.to_file(DVec3::from_array(at)).to_array();
-    let course = done.map(|r| Course {
-        steps: r.steps,
-        energy_before: r.energy_before,
-        energy_after: r.energy_after,
-        flipped_before: r.flipped_before,
-        flipped_at_rest: r.flipped_at_rest,
-        folds: r.folds.iter().map(|f| FoldSection { at: in_file(f.at), reason: f.reason.clone() }).collect(),
-        collapsed: r.collapsed.iter().map(|c| CollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
-        short: r.short.iter().map(|c| UncollapsedChord { length: c.length * scale, ..c.clone() }).collect(),
-        features: FeatureEdges { off: r.features.off.iter().map(|ends| ends.map(in_file)).collect(), ..r.features },
-    });
-    let patch = |p: &crate::embed::PatchMeasures| PatchSection {
+    let (all, patches, _) = measure_patches(&e.maps, &e.initial.face_curvature);
+    let report = e.optimised.as_ref().and_then(|result| result.as_ref().ok());
+    let patch = |p: &PatchMeasures| PatchSection {
         aspect: p.aspect,
         area: p.area * loaded.units.scale.powi(2),
-        measures: p.measures,
+        measures: measures(&p.measures),
     };
     EmbeddingSection {
-        optimised: done.is_some(),
-        problem: e.optimised.as_ref().and_then(|result| result.as_ref().err().cloned()),
-        course,
-        measures,
-        before: e.before.measures,
+        optimised: report.is_some(),
+        error: e.optimised.as_ref().and_then(|result| result.as_ref().err().cloned()),
+        optimisation: report.map(|r| optimisation(r, loaded)),
+        measures: measures(&all),
+        initial: e.initial.measures.as_ref().map(measures),
         patches: patches.iter().map(patch).collect(),
     }
 }
 
-impl Export {
-    /// Whether chords of the layout were collapsed.
-    pub fn has_collapsed(&self) -> bool {
-        matches!(&self.optimised, Some(Ok(report)) if !report.collapsed.is_empty())
+fn optimisation(r: &EmbeddingReport, loaded: &LoadedMesh) -> OptimisationSection {
+    let scale = loaded.units.scale;
+    let in_file = |at: [f64; 3]| loaded.units.to_file(DVec3::from_array(at)).to_array();
+    let flipped = r.remaining_flips.iter().map(|f| FlippedTriangle { at: in_file(f.at), reason: f.reason.clone() });
+    OptimisationSection {
+        steps: r.steps,
+        energy_before: r.energy_before,
+        energy_after: r.energy_after,
+        flipped_initially: r.flipped_before,
+        flipped_after_least_squares: r.flipped_after_least_squares,
+        remaining_flipped_triangles: flipped.collect(),
+        collapsed_chords: r
+            .collapsed_chords
+            .iter()
+            .map(|c| CollapsedChord { length: c.length * scale, ..c.clone() })
+            .collect(),
+        uncollapsed_chords: r
+            .uncollapsed_chords
+            .iter()
+            .map(|c| UncollapsedChord { length: c.length * scale, ..c.clone() })
+            .collect(),
+        feature_edges: FeatureEdgesSection {
+            total: r.features.total,
+            on_isolines: r.features.on_isolines,
+            off_isolines: r.features.off_isolines.iter().map(|ends| ends.map(in_file)).collect(),
+        },
     }
+}
 
-    /// The measures of the embedding that is written.
-    pub fn measures(&self) -> Measures {
-        measure_patches(&self.maps, &self.before.bending).0
+fn measures(m: &Measures) -> MeasuresSection {
+    MeasuresSection {
+        conformal: m.conformal,
+        planar: m.planar,
+        alignment: m.alignment,
+        max_conformal: m.max_conformal,
+        flipped: m.flipped,
+        clamped: m.clamped,
     }
 }

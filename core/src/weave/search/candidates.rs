@@ -1,4 +1,4 @@
-//! Loops to choose from: the cheapest through many points at once.
+//! Candidates: the cheapest loops through many points.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -10,13 +10,13 @@ use crate::weave::error::WeaveError;
 use crate::weave::model::Model;
 use crate::weave::proposal::Proposal;
 
-/// Search states settled per query, at most: bounds the time on large meshes.
+/// Largest number of search states settled per query; bounds the time on large meshes. Chosen by hand.
 const BUDGET: u64 = 120_000;
 
-/// A vertex, and the direction in which loops are to pass it; `None` for whichever are cheapest.
+/// A vertex and the direction in which loops pass it; `None` for the cheapest loops in any direction.
 pub(in crate::weave) type Query = (VertexId, Option<DVec3>);
 
-/// The loops that answer the queries, the cheapest first, at most so many.
+/// The loops of all queries, the cheapest first, at most `most`.
 pub(in crate::weave) fn loops(
     graph: &ElasticaGraph,
     queries: &[Query],
@@ -42,13 +42,13 @@ pub(in crate::weave) fn loops(
     tracing::debug!(queries = queries.len(), "searched");
     let mut all: Vec<Proposal> = found.into_iter().flatten().collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    // The same loop is found from many of its points.
+    // Queries at several vertices of a loop find the same loop.
     all.dedup_by(|b, a| (b.cost - a.cost).abs() < 1e-6 * a.cost && a.curve.crossings.len() == b.curve.crossings.len());
     all.truncate(most);
     Ok(all)
 }
 
-/// Queries for loops through a vertex in four directions, all around.
+/// Queries for loops through a vertex in four directions, 45° apart.
 pub(in crate::weave) fn around(model: &Model, v: VertexId) -> [Query; 4] {
     let mesh = &model.mesh;
     let normal: DVec3 = mesh.outgoing(v).map(|h| mesh.face_area_vector(mesh.face(h))).sum();

@@ -1,10 +1,9 @@
-//! Closed curves by connectivity alone, for regions that no elastica loop helps.
+//! Curves by connectivity alone, for regions that no elastica loop helps.
 //!
-//! From a triangle of the region a tree of shortest paths spans the surface, walking over the triangles of the
-//! arrangement. Every edge outside the tree closes a loop, every two boundary edges an open curve. Those that
-//! cross the same segments the same number of times modulo two, and belong to the same homology class, do
-//! the same for the arrangement; of each such class the shortest is kept. On a surface of finite type every
-//! region that is not yet a disc is cut by one of them.
+//! A tree of shortest paths over the triangles of the arrangement is grown from a triangle of the region. Every edge that
+//! the tree does not cross closes a loop, every two boundary edges an open curve. Curves are equivalent for the arrangement
+//! if they cross each segment equally often modulo two and are homologous modulo two; the shortest of each class is kept.
+//! One of them cuts any region that is not a disc. Classes are told apart by 64-bit hashes: a collision loses a curve.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -15,11 +14,10 @@ use crate::surface::{Crossing, SurfaceCurve};
 use crate::union_find::UnionFind;
 use crate::weave::proposal::Proposal;
 
-/// Price of passing one curve, as a length: short detours are worth avoiding a crossing, long ones are not.
-const PASS: f64 = 0.05;
+/// Cost of crossing a placed curve, as a length on a surface of diagonal 1: shorter detours avoid a crossing. Chosen by hand.
+const CROSSING_COST: f64 = 0.05;
 
-/// The shortest curve of each class through the triangle `root` of the arrangement, the shortest first, at
-/// most `max`.
+/// The shortest curve of each class through the triangle `root` of the arrangement, the shortest first, at most `max`.
 pub(in crate::weave) fn detours(arrangement: &Arrangement, base: &TriMesh, root: u32, max: usize) -> Vec<Proposal> {
     let tree = Tree::grow(arrangement, root);
     let mut classes: BTreeMap<u64, (f64, Closing)> = BTreeMap::new();
@@ -67,15 +65,15 @@ pub(in crate::weave) fn detours(arrangement: &Arrangement, base: &TriMesh, root:
     let curves = list.into_iter().filter_map(|(length, closing)| {
         let walk = tree.walk(arrangement, closing);
         let curve = on_base(arrangement, base, &walk, matches!(closing, Closing::Loop(_)))?;
-        Some(Proposal { curve, cost: PRICE * length, energy: None })
+        Some(Proposal { curve, cost: COST_PER_LENGTH * length, energy: None })
     });
     curves.take(max).collect()
 }
 
-/// Classes of boundary ends considered; their pairs are quadratic.
+/// Largest number of classes of boundary ends; their pairs are quadratic in number. Chosen by hand.
 const MAX_ENDS: usize = 64;
-/// Cost of a detour per length: elastica loops cost about three times their length.
-const PRICE: f64 = 3.0;
+/// Cost per length of a curve, comparable to elastica loops, which cost about three times their length.
+const COST_PER_LENGTH: f64 = 3.0;
 
 /// How a curve closes.
 #[derive(Clone, Copy)]
@@ -89,9 +87,9 @@ enum Closing {
 /// Shortest paths over the triangles of an arrangement.
 struct Tree {
     distance: Vec<f64>,
-    /// Half-edge of the triangle before, across which each triangle was entered.
+    /// The half-edge of the preceding triangle across which each triangle was entered; `u32::MAX` for the root.
     entered: Vec<u32>,
-    /// Segments crossed on the way, modulo two, as a hash.
+    /// Hash of the segments crossed an odd number of times on the way.
     class: Vec<u64>,
 }
 
@@ -100,7 +98,7 @@ impl Tree {
         let refined = &arrangement.refined;
         let n = refined.n_faces();
         let mut tree = Self { distance: vec![f64::INFINITY; n], entered: vec![u32::MAX; n], class: vec![0; n] };
-        let center = |f: u32| {
+        let centre = |f: u32| {
             let [a, b, c] = refined.corners(f).map(|v| refined.positions[v as usize]);
             (a + b + c) / 3.0
         };
@@ -113,8 +111,8 @@ impl Tree {
             for h in 3 * f..3 * f + 3 {
                 let Some(t) = refined.twin(h) else { continue };
                 let g = t / 3;
-                let pass = if refined.mark(h) == Mark::Free { 0.0 } else { PASS };
-                let reach = d + center(f).distance(center(g)) + pass;
+                let pass = if refined.mark(h) == Mark::Free { 0.0 } else { CROSSING_COST };
+                let reach = d + centre(f).distance(centre(g)) + pass;
                 if reach < tree.distance[g as usize] {
                     tree.distance[g as usize] = reach;
                     tree.entered[g as usize] = h;
@@ -126,8 +124,9 @@ impl Tree {
         tree
     }
 
-    /// A hash per half-edge such that the sum over the edges outside the tree tells homology classes apart:
-    /// zero on the edges of a spanning tree of the vertices that avoids the paths, random on the rest.
+    /// A hash for each half-edge such that the exclusive or over a curve distinguishes homology classes modulo two: zero on
+    /// a spanning tree of the vertices whose edges the paths do not cross, random on the few edges that neither tree has
+    /// (tree-cotree decomposition).
     fn homology(&self, arrangement: &Arrangement) -> Vec<u64> {
         let refined = &arrangement.refined;
         let n_half = 3 * refined.n_faces() as u32;
@@ -136,7 +135,7 @@ impl Tree {
         };
         let mut sets = UnionFind::new(refined.n_vertices());
         let mut open = Vec::new();
-        // Boundary edges first: they join each boundary loop to one point.
+        // Boundary edges first: each boundary loop counts as one vertex.
         let boundary = (0..n_half).filter(|&h| refined.is_boundary(h));
         let inner = (0..n_half).filter(|&h| refined.twin(h).is_some_and(|t| h < t) && !dual_tree(h));
         for h in boundary.chain(inner) {
@@ -145,7 +144,7 @@ impl Tree {
             }
         }
         let mut hash = vec![0; n_half as usize];
-        // What is left joins nothing new: these few edges carry the homology.
+        // The remaining edges generate the homology.
         for h in open {
             let value = mix(u64::from(h) + 0x5bd1_e995);
             hash[h as usize] = value;
@@ -156,8 +155,8 @@ impl Tree {
         hash
     }
 
-    /// The half-edges crossed, each seen from the triangle left, along the whole curve. Both ways start with
-    /// the path from the root that they share, which is left out.
+    /// The half-edges that a curve crosses, each in the triangle that is left. The path from the root that both parts of the
+    /// curve share is left out.
     fn walk(&self, arrangement: &Arrangement, closing: Closing) -> Vec<u32> {
         let refined = &arrangement.refined;
         let path_to = |mut f: u32| {
@@ -185,7 +184,7 @@ impl Tree {
     }
 }
 
-/// The curve on the original mesh that a walk over triangles of the arrangement is.
+/// A walk over triangles of the arrangement as a curve on the base mesh.
 fn on_base(arrangement: &Arrangement, base: &TriMesh, walk: &[u32], closed: bool) -> Option<SurfaceCurve> {
     let refined = &arrangement.refined;
     let mut crossings: Vec<Crossing> = Vec::new();
@@ -196,7 +195,7 @@ fn on_base(arrangement: &Arrangement, base: &TriMesh, walk: &[u32], closed: bool
             0.5 * (refined.positions[refined.origin(h) as usize] + refined.positions[refined.target(h) as usize]);
         let t = (middle.distance(p) / p.distance(q).max(f64::MIN_POSITIVE)).clamp(1e-3, 1.0 - 1e-3);
         let crossing = Crossing { halfedge: b, t };
-        // There and straight back over one edge is no way at all.
+        // Crossing an edge back and forth cancels.
         if crossings.last().is_some_and(|last| base.twin(last.halfedge) == Some(b)) {
             crossings.pop();
         } else {
@@ -214,11 +213,12 @@ fn on_base(arrangement: &Arrangement, base: &TriMesh, walk: &[u32], closed: bool
     curve.check(base).ok().map(|()| curve)
 }
 
+/// Hash of the segment that a half-edge belongs to, 0 if it belongs to none.
 fn segment_class(arrangement: &Arrangement, h: u32) -> u64 {
     arrangement.segment_at(h).map_or(0, |(s, _)| mix(u64::from(s) + 1))
 }
 
-/// The stretch of boundary that a boundary half-edge belongs to, by the last curve end before it.
+/// Hash of the stretch of boundary that a boundary half-edge belongs to: of the curve end before it, or of the whole loop.
 fn boundary_class(arrangement: &Arrangement, h: u32) -> u64 {
     let refined = &arrangement.refined;
     let mut g = h;
@@ -228,7 +228,7 @@ fn boundary_class(arrangement: &Arrangement, h: u32) -> u64 {
         if let Ok(i) = end {
             return mix(0x1_0000_0000 + i as u64);
         }
-        // The next boundary half-edge around the hole.
+        // The next boundary half-edge of the loop.
         g = next(g);
         while let Some(t) = refined.twin(g) {
             g = next(t);
@@ -240,7 +240,7 @@ fn boundary_class(arrangement: &Arrangement, h: u32) -> u64 {
     }
 }
 
-/// Scatters a number over 64 bits (splitmix64).
+/// The finaliser of SplitMix64, a hash of 64 bits.
 fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,71 +1,66 @@
-//! How well the layout of some strips fits the shape, told before it is embedded.
+//! How well the layout of strips fits the shape, predicted without optimising its embedding.
 
 use serde::Serialize;
 
-use crate::dual::{Arrangement, Colour, assess};
+use crate::dual::{Arrangement, assess};
 use crate::embed::{Problem, Settings, arc_headings, predict_fit};
-use crate::layout::{QuadLayout, embed};
+use crate::layout::Node;
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
-use crate::weave::embedding::preferred_nodes;
+use crate::weave::embedding::{Place, embedded_dual};
 use crate::weave::error::WeaveError;
-use crate::weave::mesh_role::MeshRole;
 use crate::weave::model::Model;
 
-/// What a patch is worth, in degrees of deviation from principal directions: a hundred patches more have to lower it by
-/// half a degree.
-const PATCH: f64 = 0.005;
-/// What conformal distortion is worth, likewise: a tenth more or less of it shows as much as half a degree.
-const DISTORTION: f64 = 6.0;
-/// What triangles that fold are worth, likewise: of 6000 some 50 more or less, beyond which maps of least squares cannot be
-/// unfolded, as much as a degree.
-const FOLDS: f64 = 120.0;
-/// What a quarter of index is worth, likewise: an irregular node is a point where quads cannot be square.
-const QUARTER: f64 = 0.01;
-/// What a quarter of index is worth beyond those with which a node can be embedded well and has quads of good angles: of three
-/// to six patches.
-const EXTREME: f64 = 0.5;
-const USUAL: [i32; 2] = [-2, 1];
+/// Weight of the number of patches, in degrees of deviation: a hundred patches more are worth half a degree.
+const PATCH_WEIGHT: f64 = 0.005;
+/// Weight of the conformal distortion above 2, in degrees: a tenth is worth about half a degree.
+const DISTORTION_WEIGHT: f64 = 6.0;
+/// Weight of the share of flipped triangles, in degrees: 50 of 6000, from which on maps of least squares cannot be made
+/// injective, are worth a degree.
+const FLIPPED_WEIGHT: f64 = 120.0;
+/// Weight of a quarter of index, in degrees: at an irregular node quads cannot be square.
+const INDEX_WEIGHT: f64 = 0.01;
+/// Weight of a quarter of index beyond [`USUAL_INDICES`], in degrees.
+const EXTREME_INDEX_WEIGHT: f64 = 0.5;
+/// Indices, in quarters, of nodes that can be embedded well and have quads of good angles: of three to six patches.
+const USUAL_INDICES: [i32; 2] = [-2, 1];
 
 /// How well a layout fits the shape.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Fit {
-    /// The mean deviation from principal directions that is foreseen, in degrees.
+    /// Predicted mean deviation from principal directions, in degrees.
     pub alignment: f64,
-    /// The mean conformal distortion that is foreseen.
+    /// Predicted mean conformal distortion, 2 at best.
     pub conformal: f64,
-    /// The share of triangles that are foreseen to fold before they are made not to.
-    pub folded: f64,
+    /// Predicted share of triangles that the map of least squares flips.
+    pub flipped: f64,
     /// Number of patches.
     pub patches: usize,
     /// Number of irregular nodes.
     pub irregular: usize,
-    /// The deviation and what the structure is worth, together: the less, the better.
+    /// The objective of improving, in degrees: the weighted sum of deviation, distortion and structure. The less, the
+    /// better.
     pub objective: f64,
 }
 
-/// The fit of the layout that curves on the woven mesh of a model make, with its nodes moved so many times, and what every
-/// triangle adds to its deviation.
+/// The predicted fit of the layout of curves on the woven mesh, after so many steps of its nodes, and the contribution of each
+/// triangle to the deviation.
 ///
 /// # Errors
 ///
-/// [`crate::layout::LayoutError::RedRegions`] if they make no layout; what drawing and field have to say.
+/// [`crate::layout::LayoutError::RedRegions`] if the curves have no layout, or why it cannot be embedded.
 pub(in crate::weave) fn fit(
     model: &Model,
     curves: &[&SurfaceCurve],
     steps: usize,
     progress: &Progress,
 ) -> Result<(Fit, Vec<f64>), WeaveError> {
-    let mesh = &model.mesh;
-    let arrangement = Arrangement::new(mesh, curves.iter().copied())?;
+    let arrangement = Arrangement::new(&model.mesh, curves.iter().copied())?;
     let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
-    let red: Vec<u32> = (0..reports.len() as u32).filter(|&r| reports[r as usize].colour == Colour::Red).collect();
-    let layout = QuadLayout::dual(&arrangement, &red, mesh.euler_characteristic())?;
-    let preferred = preferred_nodes(&arrangement, &layout, &reports, mesh, &model.sharp, &model.vertex_curvatures);
-    let initial_embedding = embed(&arrangement, &layout, &preferred, progress)?;
-    let mesh_role = if model.proxy.is_some() { MeshRole::Proxy } else { MeshRole::Design };
-    let job = Problem {
-        surface: model.surface(mesh_role),
+    let place = Place { mesh: &model.mesh, sharp: &model.sharp, vertex_curvatures: &model.vertex_curvatures };
+    let (layout, initial_embedding) = embedded_dual(&arrangement, &reports, place, progress)?;
+    let problem = Problem {
+        surface: model.surface(model.woven_role()),
         layout: &layout,
         initial_embedding: &initial_embedding,
         arc_headings: &arc_headings(&layout),
@@ -73,25 +68,25 @@ pub(in crate::weave) fn fit(
         pinned_arcs: &[],
         settings: Settings::default(),
     };
-    let foreseen = predict_fit(&job, steps, progress)?;
-    let index = |n: &crate::layout::Node| (if n.boundary { 2 } else { 4 }) - n.valence as i32;
+    let predicted = predict_fit(&problem, steps, progress)?;
+    let index = |n: &Node| (if n.boundary { 2 } else { 4 }) - n.valence as i32;
     let quarters: i32 = layout.nodes.iter().map(|n| index(n).abs()).sum();
-    let beyond = |i: i32| (i - i.clamp(USUAL[0], USUAL[1])).abs();
+    let beyond = |i: i32| (i - i.clamp(USUAL_INDICES[0], USUAL_INDICES[1])).abs();
     let extreme: i32 = layout.nodes.iter().map(|n| beyond(index(n))).sum();
     let patches = layout.patches.len();
-    let objective = foreseen.alignment
-        + DISTORTION * (foreseen.conformal - 2.0)
-        + FOLDS * foreseen.folded
-        + PATCH * patches as f64
-        + QUARTER * f64::from(quarters)
-        + EXTREME * f64::from(extreme);
+    let objective = predicted.alignment
+        + DISTORTION_WEIGHT * (predicted.conformal - 2.0)
+        + FLIPPED_WEIGHT * predicted.flipped
+        + PATCH_WEIGHT * patches as f64
+        + INDEX_WEIGHT * f64::from(quarters)
+        + EXTREME_INDEX_WEIGHT * f64::from(extreme);
     let fit = Fit {
-        alignment: foreseen.alignment,
-        conformal: foreseen.conformal,
-        folded: foreseen.folded,
+        alignment: predicted.alignment,
+        conformal: predicted.conformal,
+        flipped: predicted.flipped,
         patches,
         irregular: layout.n_irregular(),
         objective,
     };
-    Ok((fit, foreseen.shares))
+    Ok((fit, predicted.shares))
 }

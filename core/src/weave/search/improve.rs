@@ -1,13 +1,12 @@
-//! Improving a valid layout: other strips, with which patches follow the shape better and are fewer.
+//! Improves a valid layout by a stochastic local search over its strips.
 //!
-//! What field and map of a layout show where its nodes are drawn (`crate::weave::search::fit`) is enough to choose between layouts, and is
-//! there in a tenth of a second. So many are tried. In each round a few changes of the strips are (`crate::weave::search::trial`); those that
-//! make the price least are looked into after some steps of the nodes. The best of them is made, even if it makes the price a
-//! little higher: the less so the more rounds have gone by. The best layout of all is kept. Random numbers are the same every
-//! time.
+//! The objective is the predicted fit of a layout ([`super::fit`]), which takes a tenth of a second without optimising the
+//! embedding. In each round some changes of the strips are evaluated ([`super::trial`]), the best of them again after some
+//! steps of the nodes. The best change is made even if it raises the objective a little, by a tolerance that decreases to
+//! zero, as in threshold accepting. The best layout of all rounds is kept. Random numbers are the same in every run.
 //!
-//! What matters does not depend on triangles much smaller than patches: a mesh of many triangles is improved on a
-//! proxy. A layout is taken over only if the strips make the same of the mesh that the session weaves on.
+//! The fit hardly depends on triangles much smaller than patches, so a mesh of many triangles is improved on a coarse proxy.
+//! A layout is transferred only if the strips have the same arrangement on the woven mesh of the session.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,46 +18,48 @@ use crate::progress::Progress;
 use crate::surface::{RelaxOptions, relax};
 use crate::weave::design::{Strip, StripId};
 use crate::weave::error::WeaveError;
-use crate::weave::mesh_role::alike;
-use crate::weave::model::Options;
+use crate::weave::mesh_role::same_regions;
+use crate::weave::options::Options;
 use crate::weave::proposal::Proposal;
 use crate::weave::search::fit::Fit;
 use crate::weave::search::trial::Trial;
 use crate::weave::session::Session;
 
-/// Rounds that usually lead to where further ones gain little.
+/// Default number of rounds: further ones usually gain little.
 pub const IMPROVEMENT_ROUNDS: usize = 200;
-/// Rounds in a row without a change after which no better layout is expected.
+/// Number of consecutive rounds without a change after which the search stops. Chosen by hand.
 const IDLE: usize = 40;
-/// Triangles of the mesh that layouts are tried on, and how many times as many a mesh has that is given such a proxy; by what
-/// factor there are more where the strips do not fit it.
-const ROUGH: u32 = 6000;
-const WORTH: usize = 2;
-const FINER: u32 = 2;
-/// By how much the price may rise in a round at first, in degrees: about what a strip is worth that is of no use yet. It
-/// falls to nothing.
+/// Number of triangles of the coarsest proxy that layouts are tried on. Chosen by hand.
+const COARSEST: u32 = 6000;
+/// A mesh is improved on a proxy if it has more than this many times the proxy's triangles. Chosen by hand.
+const LEAST_SIMPLIFICATION: usize = 2;
+/// Factor between the sizes of the proxies tried in turn, until the strips have the same arrangement on one. Chosen by hand.
+const REFINEMENT: u32 = 2;
+/// By how much the objective may rise in the first round, in degrees: about what a strip costs that has no use yet. It
+/// decreases to zero quadratically.
 const TOLERANCE: f64 = 0.3;
-/// Radius of the tube in which a strip is smoothed that was carried from a proxy, in mean edges: the proxy's are longer.
+/// Radius of the tube in which a strip from a proxy is relaxed on a finer mesh, in mean edge lengths. Larger than for loops,
+/// since edges of the proxy are longer. Chosen by hand.
 const TUBE: f64 = 5.0;
 
-/// How much better a layout has become.
+/// The gain of an improvement.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Improvement {
-    /// How well it fitted before.
+    /// Fit of the layout before.
     pub before: Fit,
-    /// How well it fits now.
+    /// Fit of the best layout so far.
     pub after: Fit,
-    /// How often a better one was found.
+    /// How often a better layout was found.
     pub changes: usize,
 }
 
 impl Session {
-    /// Makes the layout fit the shape better, in so many rounds. Every better layout is shown to `watch`, with the session
-    /// as it is by then; it may break off. All changes together are one step of the history.
+    /// Improves the layout, in so many rounds at most. `watch` sees every better layout, with the session that has it, and may
+    /// stop the search. All changes together are one step of the history.
     ///
     /// # Errors
     ///
-    /// [`crate::layout::LayoutError::RedRegions`] while there is no layout, or cancelled; the design is then as before.
+    /// [`crate::layout::LayoutError::RedRegions`] while there is no layout, or when cancelled; the session is then unchanged.
     pub fn improve(
         &mut self,
         rounds: usize,
@@ -66,11 +67,11 @@ impl Session {
         watch: &mut dyn FnMut(&Self, &Improvement) -> ControlFlow<()>,
     ) -> Result<Improvement, WeaveError> {
         progress.report("Preparing to try other strips", 0.0);
-        let rough = self.rough(progress)?;
-        let mut trial = Trial::new(rough.as_ref().unwrap_or(self), self.design(), progress)?;
-        let before = self.step();
+        let coarse = self.on_coarse_proxy(progress)?;
+        let mut trial = Trial::new(coarse.as_ref().unwrap_or(self), self.design(), progress)?;
+        let before = self.state();
         let woven = Arc::clone(self.woven());
-        let done = self.improve_by(&mut trial, rounds, progress, watch);
+        let done = self.run_trial(&mut trial, rounds, progress, watch);
         match &done {
             Ok(improvement) if improvement.changes > 0 => self.remember(before),
             Ok(_) => {}
@@ -79,7 +80,8 @@ impl Session {
         done
     }
 
-    fn improve_by(
+    /// The rounds of the search; sets the strips of each better layout.
+    fn run_trial(
         &mut self,
         trial: &mut Trial,
         rounds: usize,
@@ -89,9 +91,9 @@ impl Session {
         let mut improvement = Improvement { before: trial.best.fit, after: trial.best.fit, changes: 0 };
         let mut idle = 0;
         for round in 0..rounds {
-            let left = 1.0 - round as f64 / rounds as f64;
-            progress.report("Trying other strips", 1.0 - left);
-            let changed = trial.change(TOLERANCE * left * left, progress)?;
+            let remaining = 1.0 - round as f64 / rounds as f64;
+            progress.report("Trying other strips", 1.0 - remaining);
+            let changed = trial.change(TOLERANCE * remaining * remaining, progress)?;
             idle = if changed { 0 } else { idle + 1 };
             if idle == IDLE {
                 break;
@@ -99,9 +101,9 @@ impl Session {
             if !changed || !trial.is_best() {
                 continue;
             }
-            let Some(strips) = self.carried(trial, progress)? else {
-                tracing::debug!(round, "a better layout is another one on the mesh");
-                trial.go_back();
+            let Some(strips) = self.transferred(trial, progress)? else {
+                tracing::debug!(round, "a better layout has another arrangement on the woven mesh");
+                trial.revert();
                 continue;
             };
             trial.keep(&strips);
@@ -116,47 +118,47 @@ impl Session {
         Ok(improvement)
     }
 
-    /// This session on a proxy, if that is worth while: the smallest that the strips fit.
-    fn rough(&self, progress: &Progress) -> Result<Option<Self>, WeaveError> {
-        let mut proxy = ROUGH;
-        while self.model().mesh.n_faces() > WORTH * proxy as usize {
+    /// This session on the coarsest proxy with the same arrangement; `None` if the mesh is small or there is none.
+    fn on_coarse_proxy(&self, progress: &Progress) -> Result<Option<Self>, WeaveError> {
+        let mut proxy = COARSEST;
+        while self.model().mesh.n_faces() > LEAST_SIMPLIFICATION * proxy as usize {
             match self.with_options(Options { proxy, ..self.model().options }, progress) {
                 Ok(session) => return Ok(Some(session)),
                 Err(WeaveError::Cancelled(cancelled)) => return Err(cancelled.into()),
                 Err(error) => tracing::debug!(%error, proxy, "not improved on a proxy"),
             }
-            proxy *= FINER;
+            proxy *= REFINEMENT;
         }
         Ok(None)
     }
 
-    /// The strips of a trial as strips of this session; `None` if they do not make the same layout on its mesh as on that
-    /// of the trial.
-    fn carried(&self, trial: &Trial, progress: &Progress) -> Result<Option<Vec<Strip>>, WeaveError> {
+    /// The strips of a trial as strips of this session, relaxed if they come from another mesh, or as they are if the relaxed
+    /// ones have another arrangement. `None` if these have, too.
+    fn transferred(&self, trial: &Trial, progress: &Progress) -> Result<Option<Vec<Strip>>, WeaveError> {
         for smooth in [true, false] {
             let strips: Option<Vec<Strip>> = (self.free_id().0..)
                 .zip(&trial.now.strips)
                 .map(|(id, s)| {
-                    s.known.clone().or_else(|| self.strip(trial, &s.proposal, StripId(id), smooth, progress))
+                    s.placed.clone().or_else(|| self.strip(trial, &s.proposal, StripId(id), smooth, progress))
                 })
                 .collect();
             progress.check()?;
-            if let Some(strips) = strips.filter(|s| trial.is_on(self.model()) || self.is_like(trial, s)) {
+            if let Some(strips) = strips.filter(|s| trial.is_on(self.model()) || self.has_same_regions(trial, s)) {
                 return Ok(Some(strips));
             }
         }
         Ok(None)
     }
 
-    /// Whether strips make the same of the mesh that the session weaves on as those of a trial of its mesh.
-    fn is_like(&self, trial: &Trial, strips: &[Strip]) -> bool {
+    /// Whether strips have the same regions on the woven mesh of this session as those of a trial on its mesh.
+    fn has_same_regions(&self, trial: &Trial, strips: &[Strip]) -> bool {
         let here = Arrangement::unsubdivided(&self.model().mesh, strips.iter().map(Strip::woven));
         let there = Arrangement::unsubdivided(&trial.model.mesh, trial.now.curves());
-        // What cannot be arranged is like nothing: the layout is not taken over, and what was found before stays.
-        here.ok().zip(there.ok()).is_some_and(|(here, there)| alike(&here, &there))
+        // Strips that cannot be arranged are not transferred; the best layout before stays.
+        here.ok().zip(there.ok()).is_some_and(|(here, there)| same_regions(&here, &there))
     }
 
-    /// What was tried as a strip of this session, smoothed on its mesh if it comes from another and that is asked for.
+    /// A candidate as a strip of this session, relaxed on the design mesh if `smooth` and it comes from another mesh.
     fn strip(&self, trial: &Trial, tried: &Proposal, id: StripId, smooth: bool, progress: &Progress) -> Option<Strip> {
         let (model, own) = (self.model(), trial.is_on(self.model()));
         let mesh = &*model.loaded.mesh;

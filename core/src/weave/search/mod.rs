@@ -1,7 +1,9 @@
-//! Searching for strips: the suggestion that helps most, and better strips for a valid layout.
+//! Searches for strips: the suggestion that helps most, and better strips for a valid layout.
 //!
-//! [`suggest`] takes the candidate that brings the arrangement furthest; [`improve`] tries changes ([`trial`]) by how well
-//! their layouts would fit ([`fit`]).
+//! [`suggest`] takes the candidate that brings the arrangement nearest to its goal. [`improve`] is a local search over the
+//! strips; its moves are in [`trial`], its objective in [`fit`]. Candidates are loops of the elastica graph
+//! ([`candidates`]), loops aligned to the smooth cross field ([`alignment_loops`]), or curves by connectivity alone
+//! ([`detour`]).
 
 pub(in crate::weave) mod alignment_loops;
 pub(in crate::weave) mod candidates;

@@ -1,9 +1,8 @@
-//! Suggesting the strip that helps most now.
+//! Suggests the strip that helps most.
 //!
-//! In the most urgent region some well-spread points are taken, the loops through them are found, and each is
-//! tried in the arrangement. Taken is the one of least cost per step of progress. Progress is measured by the
-//! *deficit* of an arrangement, a weighted count of what keeps regions from being good nodes; it is zero
-//! exactly when nothing is left to do.
+//! Candidates are loops through well-spread points of the most urgent region. Each is tried in the arrangement; the one of
+//! least elastica cost per gain is suggested. The gain is measured by the *deficit* of an arrangement, a weighted count of
+//! the findings that keep regions from being good nodes. It is zero exactly when the goal is reached.
 
 use crate::dual::{Colour, Finding, RegionReport, assess};
 use crate::elastica::DirectionMask;
@@ -19,30 +18,31 @@ use crate::weave::session::Session;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// How far a layout is to be woven.
+/// The goal of suggestions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Goal {
-    /// Until no region is red.
+    /// No region is red.
     Valid,
-    /// Until no region is orange either.
+    /// No region is red or orange.
     Separated,
 }
 
-/// Points tried in the most urgent region: enough to meet each of its limbs.
+/// Number of points tried in a region: enough that some lie on each of its limbs. Chosen by hand.
 const POINTS: usize = 10;
-/// Candidates tried in the arrangement, the cheapest first.
+/// Number of candidates tried in the arrangement, the cheapest first. Chosen by hand.
 const TRIED: usize = 32;
-/// Classes of curves tried per region when no elastica loop helps.
+/// Number of classes of curves tried per region when no elastica loop helps. Chosen by hand.
 const DETOURS: usize = 200;
-/// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edges: it is jagged.
+/// Radius of the tube in which a curve found by connectivity alone is relaxed, in mean edge lengths. Larger than for loops,
+/// since such curves are jagged.
 const WIDE_TUBE: f64 = 6.0;
 
-/// How loops are searched.
+/// Which loops are searched at each point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Search {
-    /// The cheapest through each point and its alternatives.
+    /// The cheapest and its alternatives.
     Cheapest,
-    /// The cheapest through each point in each of several directions.
+    /// The cheapest in each of four directions.
     Around,
 }
 
@@ -51,18 +51,18 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`NoSuggestion`], or cancelled.
+    /// [`NoSuggestion`], or when cancelled.
     pub fn suggest(&mut self, goal: Goal, progress: &Progress) -> Result<Proposal, WeaveError> {
         let woven = self.woven();
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
         let Some(&first) = urgent.first() else { return Err(NoSuggestion::Done.into()) };
         let open = DirectionMask::none();
-        // First where and how strips should go; then in every direction, wherever it is urgent; then also
-        // along strips that are there; at last by connectivity alone.
+        // First the cheapest loops in the most urgent region; then loops in four directions, in three regions; then the
+        // same without the mask of placed strips; at last curves by connectivity alone.
         let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];
         for (stage, (search, mask, regions)) in stages.into_iter().enumerate() {
-            progress.report("Looking for the strip that helps most", 0.25 * stage as f64 + 0.05);
+            progress.report("Searching for the strip that helps most", 0.25 * stage as f64 + 0.05);
             for &region in urgent.iter().take(regions) {
                 let candidates = self.candidates(region, search, mask, progress)?;
                 if let Some(best) = self.best_of(candidates, before, goal, progress)? {
@@ -81,7 +81,7 @@ impl Session {
         Err(NoSuggestion::NoHelp { region: first, reason }.into())
     }
 
-    /// Places suggestions until `goal` is reached; returns why not, if it is not.
+    /// Places suggestions until `goal` is reached. Returns why it is not, if no further strip can be suggested.
     ///
     /// # Errors
     ///
@@ -97,7 +97,8 @@ impl Session {
         }
     }
 
-    /// A curve relaxed within a tube of so many mean edges, if it then still makes progress; else as it is.
+    /// A proposal relaxed within a tube of radius `tube`, in mean edge lengths, if the relaxed curve still has a gain; else the
+    /// proposal as it is.
     fn smoothed(
         &self,
         proposal: Proposal,
@@ -114,7 +115,7 @@ impl Session {
         Ok(if helps { proposal.relaxed(relaxed) } else { proposal })
     }
 
-    /// By how much a curve would reduce the deficit, if it would and can be placed.
+    /// The gain of a curve, the reduction of the deficit; `None` if it has none or cannot be placed.
     fn gain(&self, curve: &SurfaceCurve, before: f64, goal: Goal) -> Option<f64> {
         let model = self.model();
         if model.proxy.is_some() && model.to_design(curve).is_err() {
@@ -144,7 +145,7 @@ impl Session {
         loops(&self.model().graph, &queries, mask, TRIED, progress)
     }
 
-    /// The candidate of least cost per step of progress, if any makes progress.
+    /// The candidate of least elastica cost per gain, if any has a gain.
     fn best_of(
         &self,
         candidates: Vec<Proposal>,
@@ -152,15 +153,15 @@ impl Session {
         goal: Goal,
         progress: &Progress,
     ) -> Result<Option<Proposal>, Cancelled> {
-        let prices: Vec<Option<f64>> = candidates
+        let ratios: Vec<Option<f64>> = candidates
             .par_iter()
             .map(|c| {
                 progress.check()?;
                 Ok(self.gain(&c.curve, before, goal).map(|gain| c.cost / gain))
             })
             .collect::<Result<_, Cancelled>>()?;
-        tracing::debug!(candidates = candidates.len(), helpful = prices.iter().flatten().count(), "tried");
-        let best = prices
+        tracing::debug!(candidates = candidates.len(), helpful = ratios.iter().flatten().count(), "tried");
+        let best = ratios
             .iter()
             .enumerate()
             .filter_map(|(i, p)| p.map(|p| (i, p)))
@@ -170,7 +171,7 @@ impl Session {
     }
 }
 
-/// How much keeps the regions from being good nodes.
+/// The deficit of an assessment: the weighted count of findings. Weights are chosen by hand.
 fn deficit(reports: &[RegionReport], goal: Goal) -> f64 {
     let one = |finding: &Finding| match *finding {
         Finding::Untouched => 4.0,
@@ -187,7 +188,7 @@ fn deficit(reports: &[RegionReport], goal: Goal) -> f64 {
     reports.iter().flat_map(|r| &r.findings).map(one).sum()
 }
 
-/// Regions that keep the goal from being reached, the most urgent and then the largest first.
+/// Regions that do not reach the goal, by urgency, then by area, the largest first.
 fn urgent_regions(reports: &[RegionReport], goal: Goal) -> Vec<u32> {
     let matters = |r: &RegionReport| {
         r.colour == Colour::Red
@@ -202,7 +203,7 @@ fn urgent_regions(reports: &[RegionReport], goal: Goal) -> Vec<u32> {
     list
 }
 
-/// Vertices of a region, each as far as possible from those before.
+/// Vertices of a region by farthest-point sampling.
 fn spread_points(session: &Session, region: u32) -> Vec<VertexId> {
     let (woven, mesh) = (session.woven(), &session.model().mesh);
     let mut inside: Vec<u32> = woven.arrangement.regions[region as usize]

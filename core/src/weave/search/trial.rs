@@ -1,10 +1,10 @@
-//! Strips under improvement, on the mesh that they are tried on: what could be changed, and what a change is worth.
+//! The state and the moves of the search for better strips.
 //!
-//! In each round a point is drawn at random, the likelier the more the layout deviates there from principal directions, and
-//! loops through it are candidates, of the elastica graph and of that of the smooth cross field. They are tried beside the
-//! strips that are there, in place of one that goes much the same way or of any other; and it is tried to leave one out.
-//! What splits a node often takes two strips that cross there, and what gives a knob its own nodes takes three, two across
-//! its head and one around its neck: so some are tried together, among them loops through a point not far off.
+//! In each round a vertex is drawn with probability proportional to the local deviation from principal directions. Loops of
+//! the elastica graph and of the alignment graph through it are candidates. Moves add a candidate, replace a strip by one (a
+//! parallel strip or a random one), or remove a strip. Splitting a node often takes two strips that cross there, and nodes of
+//! a knob's own take three, two across its head and one around its neck: so groups of candidates, also through a second
+//! vertex nearby, are added together.
 
 use std::sync::Arc;
 
@@ -23,45 +23,48 @@ use crate::weave::search::candidates::{Query, around, loops};
 use crate::weave::search::fit::{Fit, fit};
 use crate::weave::session::Session;
 
-/// Loops of each graph that are candidates in a round, at most, and among how many of the elastica graph they are chosen:
-/// the cheapest are short, and it is not only those that are wanted.
+/// Number of candidates from each graph in a round. Chosen by hand.
 const LOOPS: usize = 4;
-const FOUND: usize = 16;
-/// How many pairs and how many threes of candidates are tried together in a round.
-const TOGETHER: [(usize, usize); 2] = [(2, 3), (3, 4)];
-/// How far the other point of a round is, on a surface of bounding-box diagonal 1, at most: about across a limb; and how often
-/// one is drawn.
-const NOT_FAR: f64 = 0.12;
+/// Number of loops of the elastica graph that candidates are drawn from. The cheapest are short, and longer ones are wanted,
+/// too. Chosen by hand.
+const POOL: usize = 16;
+/// Groups of candidates tried together in a round, as size and number: pairs and triples. Chosen by hand.
+const GROUPS: [(usize, usize); 2] = [(2, 3), (3, 4)];
+/// Largest distance of the second point of a round from the first, on a surface of bounding-box diagonal 1: about the width
+/// of a limb. Chosen by hand.
+const NEARBY: f64 = 0.12;
+/// Number of draws for a second point. Chosen by hand.
 const DRAWS: usize = 20;
-/// Rings of triangles around a strip in which others count as going its way.
+/// Rings of triangles around a strip in which other curves count as parallel to it. Chosen by hand.
 const RINGS: usize = 2;
-/// By how much the price has to be less, in degrees, for a layout to be better.
+/// Decrease of the objective from which on a layout is better, in degrees.
 const LEAST_GAIN: f64 = 1e-3;
-/// Steps of the nodes after which a layout is judged that is to be taken: after four of them a good one of Fertility has
-/// still half a degree too much, after eight a third.
+/// Steps of the nodes before a layout is judged for acceptance: after four, the deviation of a good layout of Fertility is
+/// still half a degree too large, after eight a third of a degree.
 const STEPS: usize = 6;
-/// How many changes of a round are judged so, the best before nodes move, and how much worse than the present layout these
-/// may then be, in degrees.
-const LOOKED_INTO: usize = 2;
-const NEAR: f64 = 0.3;
+/// Number of changes of a round that are judged after steps of the nodes. Chosen by hand.
+const SHORTLISTED: usize = 2;
+/// By how much the objective of a shortlisted change may exceed that of the present layout before nodes move, in degrees.
+/// Chosen by hand.
+const SHORTLIST_TOLERANCE: f64 = 0.3;
 
-/// A strip that is tried.
+/// A strip of a layout under trial.
 #[derive(Debug, Clone)]
 pub(in crate::weave) struct Tried {
     pub proposal: Proposal,
-    /// The strip of the session that it is, once it is one.
-    pub known: Option<Strip>,
+    /// The strip of the session, once it is placed there.
+    pub placed: Option<Strip>,
 }
 
-/// Strips that make a layout.
+/// A layout under trial.
 #[derive(Debug, Clone)]
 pub(in crate::weave) struct Layout {
     pub strips: Vec<Tried>,
-    /// The price before its nodes move.
-    drawn: f64,
-    /// How well it fits after they have.
+    /// The objective before its nodes move.
+    initial_objective: f64,
+    /// Its fit after [`STEPS`] steps of the nodes.
     pub fit: Fit,
-    /// What each triangle adds to its deviation.
+    /// Contribution of each triangle to the deviation.
     shares: Vec<f64>,
 }
 
@@ -71,42 +74,45 @@ impl Layout {
     }
 }
 
-/// How well a layout fits, and what each triangle adds to its deviation; `None` for what makes no layout, or one that cannot
-/// be drawn.
-type Judged = Option<(Fit, Vec<f64>)>;
+/// The fit of a layout and the contributions of triangles to its deviation; `None` if the strips have no valid layout, or it
+/// has no embedding.
+type Evaluated = Option<(Fit, Vec<f64>)>;
 
-/// A change of the strips: one is left out, or candidates are added, or both.
+/// A move: removes a strip, adds candidates, or both.
 #[derive(Debug, Clone)]
 struct Change {
+    /// The strip that is removed.
     out: Option<usize>,
+    /// The candidates that are added.
     add: Vec<usize>,
 }
 
-/// Strips under improvement.
+/// The state of the search.
 pub(in crate::weave) struct Trial {
     pub model: Arc<Model>,
-    guidance: Option<AlignmentGraph>,
+    alignment: Option<AlignmentGraph>,
     pub now: Layout,
     pub best: Layout,
     random: Random,
 }
 
 impl Trial {
-    /// The strips of a session, which weaves those of `design` on another mesh or is the same.
+    /// Starts with the strips of a session. `design` is the design to be improved, whose strips the session has on its own
+    /// woven mesh.
     pub(in crate::weave) fn new(session: &Session, design: &Design, progress: &Progress) -> Result<Self, WeaveError> {
         let model = Arc::clone(session.model());
         let tried = |(here, own): (&Strip, &Strip)| Tried {
             proposal: Proposal { curve: here.woven().clone(), cost: own.cost, energy: own.energy },
-            known: Some(own.clone()),
+            placed: Some(own.clone()),
         };
         let strips: Vec<Tried> = session.design().strips.iter().zip(&design.strips).map(tried).collect();
         let all: Vec<&SurfaceCurve> = strips.iter().map(|s| &s.proposal.curve).collect();
-        let drawn = fit(&model, &all, 0, progress)?.0.objective;
+        let initial_objective = fit(&model, &all, 0, progress)?.0.objective;
         let (fit, shares) = fit(&model, &all, STEPS, progress)?;
-        let now = Layout { strips, drawn, shares, fit };
-        let guidance = AlignmentGraph::new(&model, progress)?;
+        let now = Layout { strips, initial_objective, shares, fit };
+        let alignment = AlignmentGraph::new(&model, progress)?;
         let random = Random(1);
-        Ok(Self { model, guidance, best: now.clone(), now, random })
+        Ok(Self { model, alignment, best: now.clone(), now, random })
     }
 
     /// Whether the strips are tried on the mesh of this model.
@@ -114,43 +120,44 @@ impl Trial {
         Arc::ptr_eq(&self.model, model)
     }
 
-    /// Makes a change after which the layout fits better, or worse by no more than so much; tells whether there was one.
+    /// Makes the best move of a round that raises the objective by less than `tolerance`; returns whether there is one.
     pub(in crate::weave) fn change(&mut self, tolerance: f64, progress: &Progress) -> Result<bool, WeaveError> {
         let (candidates, through) = self.candidates(progress)?;
         let changes = self.changes(&candidates, through);
-        let drawn = self.fits(&changes, &candidates, 0, progress)?;
-        let pairs = changes.into_iter().zip(drawn).filter_map(|(change, found)| Some((change, found?.0.objective)));
-        let mut hopeful: Vec<(Change, f64)> =
-            pairs.filter(|(_, objective)| *objective < self.now.drawn + NEAR).collect();
-        hopeful.sort_by(|a, b| a.1.total_cmp(&b.1));
-        hopeful.truncate(LOOKED_INTO);
-        let (changes, drawn): (Vec<Change>, Vec<f64>) = hopeful.into_iter().unzip();
+        let initial = self.fits(&changes, &candidates, 0, progress)?;
+        let pairs = changes.into_iter().zip(initial).filter_map(|(change, found)| Some((change, found?.0.objective)));
+        let mut shortlist: Vec<(Change, f64)> =
+            pairs.filter(|(_, objective)| *objective < self.now.initial_objective + SHORTLIST_TOLERANCE).collect();
+        shortlist.sort_by(|a, b| a.1.total_cmp(&b.1));
+        shortlist.truncate(SHORTLISTED);
+        let (changes, initial): (Vec<Change>, Vec<f64>) = shortlist.into_iter().unzip();
         let moved = self.fits(&changes, &candidates, STEPS, progress)?;
-        // What is only left out is not to cost anything: else strips would become fewer and fewer.
+        // A removal alone must not raise the objective: else strips would become fewer and fewer.
         let most = |c: &Change| self.now.fit.objective + if c.add.is_empty() { 0.0 } else { tolerance };
-        let found = changes.into_iter().zip(drawn).zip(moved).filter_map(|(pair, found)| Some((pair, found?)));
+        let found = changes.into_iter().zip(initial).zip(moved).filter_map(|(pair, found)| Some((pair, found?)));
         let allowed = found.filter(|((change, _), (fit, _))| fit.objective < most(change));
-        let Some(((change, drawn), (fit, shares))) = allowed.min_by(|a, b| a.1.0.objective.total_cmp(&b.1.0.objective))
+        let Some(((change, initial_objective), (fit, shares))) =
+            allowed.min_by(|a, b| a.1.0.objective.total_cmp(&b.1.0.objective))
         else {
             return Ok(false);
         };
         if let Some(out) = change.out {
             self.now.strips.remove(out);
         }
-        let added = change.add.iter().map(|&c| Tried { proposal: candidates[c].clone(), known: None });
+        let added = change.add.iter().map(|&c| Tried { proposal: candidates[c].clone(), placed: None });
         self.now.strips.extend(added);
-        (self.now.drawn, self.now.fit, self.now.shares) = (drawn, fit, shares);
+        (self.now.initial_objective, self.now.fit, self.now.shares) = (initial_objective, fit, shares);
         Ok(true)
     }
 
-    /// How well the layouts fit that changes make, after so many steps of the nodes.
+    /// The fits of the layouts after moves, after so many steps of the nodes.
     fn fits(
         &self,
         changes: &[Change],
         candidates: &[Proposal],
         steps: usize,
         progress: &Progress,
-    ) -> Result<Vec<Judged>, Cancelled> {
+    ) -> Result<Vec<Evaluated>, Cancelled> {
         let one = |change: &Change| {
             progress.check()?;
             Ok(fit(&self.model, &self.with(change, candidates), steps, progress).ok())
@@ -160,43 +167,43 @@ impl Trial {
         Ok(found)
     }
 
-    /// Whether the present layout fits better than the best so far.
+    /// Whether the present layout is better than the best one before.
     pub(in crate::weave) fn is_best(&self) -> bool {
         self.now.fit.objective < self.best.fit.objective - LEAST_GAIN
     }
 
-    /// The present layout is the best so far, and these are its strips.
+    /// Makes the present layout the best one; `strips` are its strips in the session.
     pub(in crate::weave) fn keep(&mut self, strips: &[Strip]) {
         for (tried, strip) in self.now.strips.iter_mut().zip(strips) {
-            tried.known = Some(strip.clone());
+            tried.placed = Some(strip.clone());
         }
         self.best = self.now.clone();
     }
 
-    /// Goes back to the best layout so far.
-    pub(in crate::weave) fn go_back(&mut self) {
+    /// Returns to the best layout.
+    pub(in crate::weave) fn revert(&mut self) {
         self.now = self.best.clone();
     }
 
-    /// Loops through a point where the layout deviates from principal directions, then such through one not far off, smoothed;
-    /// and how many the first are.
+    /// The candidates of a round, smoothed: loops through the first vertex, then through the second. Also returns the number of
+    /// the former.
     fn candidates(&mut self, progress: &Progress) -> Result<(Vec<Proposal>, usize), WeaveError> {
         let v = self.point();
         let other = self.point_near(v);
         let model = &*self.model;
         let none = DirectionMask::none();
         let plain: Vec<Query> = std::iter::once((v, None)).chain(around(model, v)).collect();
-        let mut found = loops(&model.graph, &plain, &none, FOUND, progress)?;
+        let mut found = loops(&model.graph, &plain, &none, POOL, progress)?;
         let mut chosen = Vec::new();
         while chosen.len() < LOOPS && !found.is_empty() {
             chosen.push(found.swap_remove(self.random.below(found.len())));
         }
         let mut through = chosen.len();
-        if let Some(guidance) = &self.guidance {
-            chosen.extend(loops(&guidance.graph, &guidance.queries(v), &none, LOOPS, progress)?);
+        if let Some(alignment) = &self.alignment {
+            chosen.extend(loops(&alignment.graph, &alignment.queries(v), &none, LOOPS, progress)?);
             through = chosen.len();
             if let Some(w) = other {
-                chosen.extend(loops(&guidance.graph, &guidance.queries(w), &none, LOOPS, progress)?);
+                chosen.extend(loops(&alignment.graph, &alignment.queries(w), &none, LOOPS, progress)?);
             }
         }
         let smooth = |p: Proposal| match relax(&model.mesh, &p.curve, &RelaxOptions::default(), progress) {
@@ -208,7 +215,7 @@ impl Trial {
         Ok((smoothed, through))
     }
 
-    /// A vertex at random, the likelier the more its triangles add to the deviation.
+    /// A random vertex of a triangle drawn with probability proportional to its contribution to the deviation.
     fn point(&mut self) -> VertexId {
         let mut left = self.random.unit() * self.now.shares.iter().sum::<f64>();
         let beyond = |share: &f64| {
@@ -219,25 +226,25 @@ impl Trial {
         self.model.mesh.face_vertices(FaceId::new(face))[self.random.below(3)]
     }
 
-    /// Another such vertex not far off, if there is one.
+    /// Another such vertex within [`NEARBY`] of `v`, if one is drawn.
     fn point_near(&mut self, v: VertexId) -> Option<VertexId> {
         let model = Arc::clone(&self.model);
         let at = |v| model.mesh.position(v);
-        (0..DRAWS).map(|_| self.point()).find(|&w| w != v && at(w).distance(at(v)) < NOT_FAR)
+        (0..DRAWS).map(|_| self.point()).find(|&w| w != v && at(w).distance(at(v)) < NEARBY)
     }
 
-    /// What is to be tried in a round, with candidates of which the first so many go through its point.
+    /// The moves of a round; the first `through` candidates pass its first vertex.
     fn changes(&mut self, candidates: &[Proposal], through: usize) -> Vec<Change> {
         let n = self.now.strips.len();
         let mut list = vec![Change { out: Some(self.random.below(n)), add: Vec::new() }];
         let beside: Vec<Vec<bool>> = self.now.curves().map(|c| self.beside(c)).collect();
         for (c, candidate) in candidates[..through].iter().enumerate() {
             let shared = |&i: &usize| self.passed(&candidate.curve).filter(|f| beside[i][f.index()]).count();
-            let alike = (0..n).max_by_key(shared);
+            let parallel = (0..n).max_by_key(shared);
             list.push(Change { out: None, add: vec![c] });
-            list.extend([alike, Some(self.random.below(n))].map(|out| Change { out, add: vec![c] }));
+            list.extend([parallel, Some(self.random.below(n))].map(|out| Change { out, add: vec![c] }));
         }
-        for (size, count) in TOGETHER {
+        for (size, count) in GROUPS {
             for _ in 0..count {
                 let mut add: Vec<usize> = (0..size).map(|_| self.random.below(candidates.len())).collect();
                 add.sort_unstable();
@@ -253,7 +260,7 @@ impl Trial {
         curve.crossings.iter().map(|c| self.model.mesh.face(c.halfedge))
     }
 
-    /// For each triangle whether a curve passes near it.
+    /// For each triangle whether a curve passes within [`RINGS`] rings of it.
     fn beside(&self, curve: &SurfaceCurve) -> Vec<bool> {
         let mesh = &self.model.mesh;
         let mut near = vec![false; mesh.n_faces()];
@@ -266,14 +273,14 @@ impl Trial {
         near
     }
 
-    /// The strips after a change.
+    /// The strips after a move.
     fn with<'a>(&'a self, change: &Change, candidates: &'a [Proposal]) -> Vec<&'a SurfaceCurve> {
         let kept = self.now.curves().enumerate().filter(|(i, _)| Some(*i) != change.out).map(|(_, curve)| curve);
         kept.chain(change.add.iter().map(|&c| &candidates[c].curve)).collect()
     }
 }
 
-/// Random numbers by SplitMix64.
+/// Pseudo-random numbers by SplitMix64.
 struct Random(u64);
 
 impl Random {
@@ -284,12 +291,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// From 0 to 1.
+    /// Uniform in `[0, 1)`.
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Below `n`, which is not 0.
+    /// Below `n`, or 0 if `n` is 0.
     fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }

@@ -1,4 +1,4 @@
-//! Other strips for a better layout.
+//! Improving layouts of small models.
 
 use std::ops::ControlFlow;
 
@@ -8,8 +8,8 @@ use crate::surface::SurfaceCurve;
 use crate::testing::{column, diagonal, row};
 
 const N: u32 = 16;
-/// Enough for the few strips of these layouts.
-const FEW: usize = 6;
+/// Rounds; enough for layouts of a few strips.
+const ROUNDS: usize = 6;
 
 fn with_strips(mesh: TriMesh, curves: impl IntoIterator<Item = SurfaceCurve>) -> Session {
     let mut s = session(mesh);
@@ -20,7 +20,7 @@ fn with_strips(mesh: TriMesh, curves: impl IntoIterator<Item = SurfaceCurve>) ->
 }
 
 /// A torus with more strips than it needs.
-fn lavish() -> Session {
+fn redundant() -> Session {
     let rows = [2, 12].map(|j| row(N, j, true, 0.4));
     let columns = [3, 13].map(|i| column(N, N, i, true, 0.4));
     with_strips(torus(N, N), rows.into_iter().chain(columns))
@@ -31,10 +31,10 @@ fn improve(s: &mut Session, rounds: usize) -> Improvement {
 }
 
 #[test]
-fn strips_that_a_layout_does_not_need_are_left_out_in_one_step_of_the_history() {
-    let mut s = lavish();
+fn redundant_strips_are_removed_in_one_step_of_the_history() {
+    let mut s = redundant();
     let before = s.design().strips.clone();
-    let found = improve(&mut s, FEW);
+    let found = improve(&mut s, ROUNDS);
     let now = found.after.patches;
     assert!((found.before.patches, s.design().strips.len() < 4) == (4, true) && now < 4, "{found:?}");
     assert!(
@@ -49,24 +49,24 @@ fn strips_that_a_layout_does_not_need_are_left_out_in_one_step_of_the_history() 
 }
 
 #[test]
-fn strips_that_wind_are_exchanged_for_such_that_follow_the_shape() {
+fn winding_strips_are_replaced_by_aligned_ones() {
     let mut s = with_strips(torus(N, N), [column(N, N, 3, true, 0.4), diagonal(N)]);
-    let found = improve(&mut s, FEW);
-    // The field does not tell one winding from another, since neither turns; the map does.
+    let found = improve(&mut s, ROUNDS);
+    // Fields of both windings are parallel; only the map shows which of them is aligned.
     assert!(found.after.objective < 0.7 * found.before.objective && found.after.alignment < 4.0, "{found:?}");
     assert!(s.woven().red().is_empty() && found.after.irregular == 0);
-    // What was foreseen comes about.
+    // The prediction comes true.
     let export = export(&s, &ExportOptions::default(), &Progress::new()).unwrap();
     assert!(export.measures().alignment < 4.0, "{:?}", export.measures());
 }
 
 #[test]
-fn an_improvement_is_stopped_and_kept_or_cancelled_and_dropped() {
-    let mut s = lavish();
+fn a_stopped_improvement_is_kept_and_a_cancelled_one_dropped() {
+    let mut s = redundant();
     let before = s.design().clone();
     let progress = Progress::new();
     let mut seen = 0;
-    let cancelled = s.improve(FEW, &progress, &mut |_, _| {
+    let cancelled = s.improve(ROUNDS, &progress, &mut |_, _| {
         seen += 1;
         progress.cancel();
         ControlFlow::Continue(())
@@ -76,7 +76,7 @@ fn an_improvement_is_stopped_and_kept_or_cancelled_and_dropped() {
     assert_eq!(s.woven().arrangement.crossings.len(), 4);
 
     let mut shown = 0;
-    let stopped = s.improve(FEW, &Progress::new(), &mut |s, i| {
+    let stopped = s.improve(ROUNDS, &Progress::new(), &mut |s, i| {
         shown = s.design().strips.len();
         assert_eq!(i.changes, 1);
         ControlFlow::Break(())
@@ -86,7 +86,7 @@ fn an_improvement_is_stopped_and_kept_or_cancelled_and_dropped() {
 }
 
 #[test]
-fn what_is_improved_does_not_depend_on_threads() {
+fn improvements_do_not_depend_on_the_number_of_threads() {
     let designs = [1, 2].map(|n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         pool.install(|| {
@@ -101,13 +101,13 @@ fn what_is_improved_does_not_depend_on_threads() {
 #[test]
 fn without_a_layout_there_is_nothing_to_improve() {
     let mut s = with_strips(torus(N, N), [row(N, 2, true, 0.4)]);
-    let error = s.improve(FEW, &Progress::new(), &mut |_, _| ControlFlow::Continue(())).unwrap_err();
+    let error = s.improve(ROUNDS, &Progress::new(), &mut |_, _| ControlFlow::Continue(())).unwrap_err();
     assert!(matches!(error, WeaveError::Layout(LayoutError::RedRegions(_))), "{error}");
     assert_eq!(s.design().strips.len(), 1);
 }
 
 #[test]
-fn a_large_mesh_is_improved_on_a_small_one() {
+fn a_large_mesh_is_improved_on_a_proxy() {
     let n = 80;
     let rows = [8, 48].map(|j| row(n, j, true, 0.4));
     let mut s = with_strips(torus(n, n), rows.into_iter().chain([column(n, n, 3, true, 0.4), diagonal(n)]));

@@ -1,5 +1,6 @@
-//! A designer's steps on small models.
+//! Weaving on small models, step by step.
 
+mod editing;
 mod improving;
 
 use std::path::Path;
@@ -7,7 +8,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::embedding::initial_layout_as_woven;
-use super::export::files::export_layout;
+use super::export::session_export::export_layout;
 use super::search::detour;
 use super::*;
 use crate::dual::Colour;
@@ -18,7 +19,7 @@ use crate::progress::Progress;
 use crate::testing::{grid, square, torus};
 
 fn loaded(mesh: TriMesh) -> LoadedMesh {
-    let units = Normalisation { center: DVec3::ZERO, scale: 1.0 };
+    let units = Normalisation { centre: DVec3::ZERO, scale: 1.0 };
     LoadedMesh { mesh: mesh.into(), units, repairs: Vec::new(), name: "test".into() }
 }
 
@@ -59,7 +60,7 @@ fn three_suggestions_separate_the_corners_of_a_cube() {
 
     let mesh = &s.model().mesh;
     let source = s.design().mesh.clone();
-    let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.before.initial_embedding).unwrap();
+    let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.initial.initial_embedding).unwrap();
     let (again, _) = file.draw(mesh).unwrap().to_embedding().unwrap();
     assert_eq!((again.nodes, again.patches.len()), (export.layout.nodes, 6));
 }
@@ -87,7 +88,7 @@ fn several_components_are_woven_one_after_the_other() {
 }
 
 #[test]
-fn undo_redo_and_removal_restore_what_was() {
+fn undo_redo_and_removal_restore_former_states() {
     let progress = Progress::new();
     let mut s = session(torus(32, 16));
     let first = place(&mut s, DVec3::new(0.4, 0.0, 0.0));
@@ -126,7 +127,7 @@ fn a_placed_strip_is_not_proposed_again() {
 }
 
 #[test]
-fn red_regions_are_named_and_refuse_the_export() {
+fn red_regions_are_named_and_prevent_the_export() {
     let mut s = session(torus(32, 16));
     place(&mut s, DVec3::new(0.4, 0.0, 0.0));
     assert_eq!(s.woven().count(Colour::Red), 1);
@@ -135,8 +136,8 @@ fn red_regions_are_named_and_refuse_the_export() {
 }
 
 #[test]
-fn connectivity_alone_finds_what_separates() {
-    // A bare torus and one with a ring: some detour makes progress on each, without any elastica loop.
+fn detours_cut_regions_that_are_no_discs() {
+    // On a torus without strips and on one with a single strip some detour does not separate.
     let mut s = session(torus(24, 12));
     for wanted in [0, 1] {
         let (woven, mesh) = (s.woven().clone(), s.model().mesh.clone());
@@ -153,7 +154,7 @@ fn connectivity_alone_finds_what_separates() {
 }
 
 #[test]
-fn cancelled_work_leaves_the_design_as_it_was() {
+fn cancelled_work_leaves_the_design_unchanged() {
     let mut s = session(torus(32, 16));
     place(&mut s, DVec3::new(0.4, 0.0, 0.0));
     let before = s.design().clone();
@@ -192,12 +193,12 @@ fn scripts_name_the_step_that_fails() {
         (r#"{"hover": [1.0, 0.0, 0.0]}, {"place": true}, {"browse": 1}"#, 3),
         (r#"{"undo": true}, {"delete": 3}"#, 2),
     ] {
-        assert!(matches!(run(steps), Err(ScriptError::Senseless { step, .. }) if step == wrong));
+        assert!(matches!(run(steps), Err(ScriptError::NotApplicable { step, .. }) if step == wrong));
     }
 }
 
 #[test]
-fn pins_find_their_parts_again_and_follow_undo() {
+fn pins_identify_their_parts_and_follow_undo() {
     let source = MeshSource::Builtin("rounded-cube".into());
     let progress = Progress::new();
     let mut s = Session::open(builtin("rounded-cube").unwrap(), source, Options::default(), &progress).unwrap();
@@ -221,8 +222,8 @@ fn pins_find_their_parts_again_and_follow_undo() {
     assert!(s.design().pins.is_empty());
 }
 
-/// A session on a mesh of which a proxy of `proxy` triangles is made.
-fn proxied(mesh: TriMesh, proxy: u32) -> Session {
+/// A session that weaves a mesh on a proxy of `proxy` triangles.
+fn on_proxy(mesh: TriMesh, proxy: u32) -> Session {
     let source = MeshSource::File("test.obj".into());
     let options = Options { proxy, ..Options::default() };
     Session::open(loaded(mesh), source, options, &Progress::new()).unwrap()
@@ -231,7 +232,7 @@ fn proxied(mesh: TriMesh, proxy: u32) -> Session {
 #[test]
 fn a_large_mesh_is_woven_on_its_proxy() {
     let progress = Progress::new();
-    let mut s = proxied(torus(96, 48), 2000);
+    let mut s = on_proxy(torus(96, 48), 2000);
     assert_eq!((s.model().mesh.n_faces(), s.model().loaded.mesh.n_faces()), (2000, 9216));
     for p in [DVec3::new(0.4, 0.0, 0.0), DVec3::new(0.0, 0.4, 0.0)] {
         let at = s.model().index.nearest(p);
@@ -248,7 +249,7 @@ fn a_large_mesh_is_woven_on_its_proxy() {
         strip.woven().check(&s.model().mesh).unwrap();
         assert!((strip.curve.length(&mesh) / strip.woven().length(&s.model().mesh) - 1.0).abs() < 0.05);
     }
-    // Opened again it is the same to the last bit.
+    // A design that is written and read again is the same to the last bit.
     let text = serde_json::to_string(&design).unwrap();
     let again: Design = serde_json::from_str(&text).unwrap();
     assert_eq!(again, design);
@@ -260,7 +261,7 @@ fn a_large_mesh_is_woven_on_its_proxy() {
 #[test]
 fn a_design_opens_with_and_without_a_proxy() {
     let progress = Progress::new();
-    let mut s = proxied(torus(96, 48), 2000);
+    let mut s = on_proxy(torus(96, 48), 2000);
     assert_eq!(s.weave_to(Goal::Valid, &progress).unwrap(), None);
     let design = s.design().clone();
     let curves = |d: &Design| d.strips.iter().map(|s| s.curve.clone()).collect::<Vec<_>>();
@@ -277,7 +278,7 @@ fn a_design_opens_with_and_without_a_proxy() {
 }
 
 #[test]
-fn without_a_proxy_a_design_says_nothing_of_it() {
+fn a_design_without_a_proxy_does_not_mention_one() {
     let mut s = session(torus(32, 16));
     place(&mut s, DVec3::new(0.4, 0.0, 0.0));
     let text = serde_json::to_string(s.design()).unwrap();
@@ -288,7 +289,7 @@ fn without_a_proxy_a_design_says_nothing_of_it() {
 fn a_layout_embedded_on_the_proxy_has_its_quads_on_the_mesh() {
     let progress = Progress::new();
     for mesh in [torus(96, 48), grid(64, 64, [false, false], |u, v| DVec3::new(u, v, 0.1 * (6.0 * u).sin() * v))] {
-        let mut s = proxied(mesh, 1500);
+        let mut s = on_proxy(mesh, 1500);
         assert_eq!(s.weave_to(Goal::Valid, &progress).unwrap(), None);
         let mesh = s.model().loaded.mesh.clone();
         let far = |e: &Export| {

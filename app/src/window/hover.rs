@@ -1,0 +1,60 @@
+//! The proposals and the node or arc under the pointer.
+
+use glam::Vec2;
+use plait_core::surface::SurfacePoint;
+
+use crate::engine::{LayoutPart, Proposal};
+
+/// What is under the pointer.
+#[derive(Debug, Default)]
+pub struct Hover {
+    /// The surface point under the pointer, picked anew whenever the pointer or the view moves.
+    pub point: Option<SurfacePoint>,
+    /// The node or arc under the pointer, if it can be pinned.
+    pub part: Option<LayoutPart>,
+    /// The generation of the latest request, while a reply is expected.
+    pub generation: Option<u64>,
+    /// The proposals through the point, best first.
+    pub proposals: Vec<Proposal>,
+    /// The index of the proposal shown.
+    pub chosen: usize,
+    /// The position of the latest placement or choice. Small movements from there request no new proposals.
+    pub calm_at: Option<Vec2>,
+    /// Whether a click came before the reply: the best proposal is then placed when it arrives.
+    pub place_on_arrival: bool,
+    /// The position of the latest request.
+    pub asked_at: Option<Vec2>,
+}
+
+impl Hover {
+    /// The proposal that a click would place.
+    pub fn shown(&self) -> Option<&Proposal> {
+        self.proposals.get(self.chosen)
+    }
+
+    /// Takes in a reply. Returns the proposal that is to be placed at once, if a click came before the reply.
+    pub fn arrived(&mut self, generation: u64, proposals: Vec<Proposal>, complete: bool) -> Option<Proposal> {
+        if self.generation != Some(generation) {
+            return None;
+        }
+        self.proposals = proposals;
+        self.chosen = 0;
+        if !complete {
+            return None;
+        }
+        self.generation = None;
+        let place = std::mem::take(&mut self.place_on_arrival);
+        self.proposals.first().filter(|_| place).cloned()
+    }
+
+    /// Drops the proposals and the request.
+    pub fn clear(&mut self) {
+        *self = Self { calm_at: self.calm_at, point: self.point, part: self.part, ..Self::default() };
+    }
+
+    /// Shows the proposal `by` further on, at most the first or the last.
+    pub fn browse(&mut self, by: i32) {
+        let last = self.proposals.len().saturating_sub(1);
+        self.chosen = self.chosen.saturating_add_signed(by as isize).min(last);
+    }
+}

@@ -1,0 +1,48 @@
+//! The options of a design.
+
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::SHARP_DIHEDRAL;
+
+/// What the designer may set.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Options {
+    /// Radius of the ball over which curvature is averaged, as a fraction of the bounding-box diagonal. Relief smaller than
+    /// this does not align strips.
+    pub curvature_radius: f64,
+    /// Dihedral angle above which an edge is sharp, in radians.
+    pub sharp_dihedral: f64,
+    /// Whether strips end at right angles on the boundary.
+    pub aligned_boundary: bool,
+    /// Number of triangles of the proxy. Meshes of more than twice as many are woven on one; 0: no mesh is.
+    #[serde(skip_serializing_if = "is_default_proxy")]
+    pub proxy: u32,
+    /// Radius over which the surface is smoothed for weaving, as a fraction of the bounding-box diagonal; strips ignore
+    /// smaller relief. 0: no smoothing. A smoothed mesh is a proxy, whatever its size.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub smoothing: f64,
+}
+
+/// Number of triangles of a proxy. `docs/decisions.md` has the measurements.
+const PROXY: u32 = 30_000;
+
+fn is_default_proxy(n: &u32) -> bool {
+    *n == PROXY
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            curvature_radius: 0.03,
+            sharp_dihedral: SHARP_DIHEDRAL,
+            aligned_boundary: true,
+            proxy: PROXY,
+            smoothing: 0.0,
+        }
+    }
+}

@@ -188,7 +188,7 @@ impl DualPatch {
             }
             let at = |k: usize| {
                 let arc = layout.patches[p].sides[k].0 as usize;
-                sides[k].iter().copied().find(|&v| submesh.whole[v as usize] == middles[arc])
+                sides[k].iter().copied().find(|&v| submesh.parent[v as usize] == middles[arc])
             };
             let (Some(from), Some(to)) = (at(i), at(i + 2)) else {
                 return Err(PatchShapeError::Sides { patch: p }.into());
@@ -196,7 +196,7 @@ impl DualPatch {
             mesh.insert_path((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
                 .map_err(|source| DualCurvesError::Path { patch: p, source })?;
         }
-        Ok(Self { mesh, parent: submesh.whole, faces })
+        Ok(Self { mesh, parent: submesh.parent, faces })
     }
 }
 

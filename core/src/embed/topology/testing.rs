@@ -4,7 +4,7 @@ use crate::dual::Arrangement;
 use crate::embed::EmbeddingTopology;
 use crate::embed::arc_headings;
 use crate::embed::topology::period_jumps::{fewest_edges, move_index, vertex_index};
-use crate::layout::{QuadLayout, embed};
+use crate::layout::{QuadLayout, initial_embedding};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::Metric;
@@ -24,7 +24,7 @@ pub fn torus_topology(cells: [u32; 2], rows: [u32; 2], columns: [u32; 2]) -> Emb
     curves.extend(columns.map(|i| column(n, m, i, true, 0.6)));
     let arrangement = Arrangement::new(&mesh, &curves).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
-    let initial = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+    let initial = initial_embedding(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
     let mut topology = EmbeddingTopology::new(&mesh, &initial, &layout, &arc_headings(&layout)).unwrap();
     for (node, valence) in [(0, 3), (1, 5)] {
         topology.nodes[node].valence = valence;

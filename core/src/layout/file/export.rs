@@ -276,3 +276,22 @@ fn separated(mut fractions: Vec<f64>) -> Vec<f64> {
     }
     fractions
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn separated_fractions_keep_their_order_and_distance() {
+        let fractions = separated(vec![0.0, 0.0, 0.5, 0.5, 1.0]);
+        assert!(fractions[0] > 0.0 && fractions[4] < 1.0);
+        assert!(fractions.windows(2).all(|w| w[1] - w[0] > 0.5 * MIN_SEPARATION), "{fractions:?}");
+        assert!((fractions[2] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn fractions_that_are_apart_do_not_move() {
+        assert_eq!(separated(vec![0.1, 0.2, 0.9]), [0.1, 0.2, 0.9]);
+        assert_eq!(separated(Vec::new()), Vec::<f64>::new());
+    }
+}

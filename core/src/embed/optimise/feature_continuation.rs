@@ -152,11 +152,11 @@ impl Optimiser<'_> {
     pub(super) fn converge_map(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let penalised = self.penalised_edges();
         let (Some(system), Some(distortion)) = (&mut self.systems.map, self.distortion) else { return Ok(()) };
-        let newton = system.newton()?;
+        let newton = system.newton_system()?;
         let State { metric, field, objective, anisotropy_share, solution, .. } = &self.state;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (distortion, anisotropy_share))
             .with_isoline_penalties(&penalised);
-        let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
+        let Some(mut at) = system.injective_map(&energy, solution.free.clone()) else { return Ok(()) };
         system.descend(&newton, &energy, &mut at, NEWTON_STEPS, progress)?;
         self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };
         Ok(())

@@ -16,7 +16,7 @@ use crate::embed::pipeline::phases::{Observer, Phases};
 use crate::embed::pipeline::report::{Next, OptimisedEmbedding, Snapshot};
 use crate::embed::problem::{Problem, Settings, Surface};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, carry};
+use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, transfer_embedding};
 use crate::mesh::{BreadthFirst, FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
@@ -167,7 +167,7 @@ impl ProxyTransfer<'_> {
             let found = self.proxy.polyline_to_proxy(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the proxy")).ok()
         };
-        Ok(carry(given, self.proxy.mesh(), transferred, place, progress)?)
+        Ok(transfer_embedding(given, self.proxy.mesh(), transferred, place, progress)?)
     }
 
     /// An embedding on the proxy as an initial embedding on the mesh; `None` if there is none.
@@ -185,7 +185,7 @@ impl ProxyTransfer<'_> {
             let found = self.proxy.polyline_to_original(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the mesh")).ok()
         };
-        Ok(carry((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, transferred, place, progress)?)
+        Ok(transfer_embedding((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, transferred, place, progress)?)
     }
 
     /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each

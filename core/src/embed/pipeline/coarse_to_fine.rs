@@ -185,7 +185,13 @@ impl ProxyTransfer<'_> {
             let found = self.proxy.polyline_to_original(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the mesh")).ok()
         };
-        Ok(transfer_embedding((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, transferred, place, progress)?)
+        Ok(transfer_embedding(
+            (layout, embedding, self.proxy.mesh().n_vertices()),
+            self.fine,
+            transferred,
+            place,
+            progress,
+        )?)
     }
 
     /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each

@@ -382,7 +382,7 @@ fn patches_beside_other_arcs_are_an_error() {
     let mut other = s.layout.clone();
     other.patches.swap(0, 1);
     let error = map_rectangles(&other, &traced, &Progress::new()).unwrap_err();
-    assert!(matches!(error, RectangleError::Sides { patch: 0 | 1 }), "{error}");
+    assert!(matches!(error, RectangleError::Shape(PatchShapeError::Sides { patch: 0 | 1 })), "{error}");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::embed::trace::samples::{self, Sample};
 use crate::embed::trace::testing::{
     area, completed, cycles, irregular, rectangles, sizes_are, trace, trace_rectangles,
 };
+use crate::layout::PatchShapeError;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::turn;
 use crate::progress::Progress;

@@ -34,7 +34,7 @@ count() {
 }
 
 bench=(creature --seed 1 --threads 1 --no-reference)
-count embed plait_core::embed::pipeline::optimise::optimise_embedding \
+count embed plait_core::embed::pipeline::coarse_to_fine::optimise_embedding \
     embed "$root/tests/scripts/rounded-cube.json" --out "$scratch/out" --quiet --quads 1 &
 other=$!
 count hover plait_app::cli::bench::hover::searches bench hover "${bench[@]}" --points 20 --strips 0 --search-only

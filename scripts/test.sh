@@ -10,7 +10,8 @@ cd "$root"
 source scripts/packages.sh
 
 packages=("${linker[@]}" "${window[@]}" xvfb xdotool imagemagick valgrind)
-# The independent check of quad meshes lies beside the repository, if at all.
+# The independent check of quad meshes lies beside the repository, if at all. A Python from elsewhere may come first on the
+# path; the packages then belong to the system's, which the tests try next.
 if [[ -f ../shared/check/check_quads.py ]] && ! python3 -c 'import numpy, scipy' 2>/dev/null; then
     packages+=(python3 python3-numpy python3-scipy)
 fi

@@ -145,6 +145,14 @@ pub fn manifold(faces: &[Vec<u32>]) -> Shape {
     Shape { euler: around.len() as i64 - edges as i64 + faces.len() as i64, boundary_loops }
 }
 
+/// The first Python on the path, and the system's, to which packages of the system belong.
+const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
+
+/// Whether a Python can run a line of code.
+fn runs(python: &str, code: &str) -> bool {
+    Command::new(python).args(["-c", code]).output().is_ok_and(|o| o.status.success())
+}
+
 /// The figures of an independent check of quad meshes; where it or what it needs is missing, [`skip`].
 ///
 /// # Panics
@@ -152,12 +160,11 @@ pub fn manifold(faces: &[Vec<u32>]) -> Shape {
 /// If the check fails.
 pub fn independent_check(quads: &Path, source: &Path) -> Option<serde_json::Value> {
     let script = beside("check")?.join("check_quads.py");
-    let able = Command::new("python3").args(["-c", "import numpy, scipy"]).output();
-    if !able.is_ok_and(|o| o.status.success()) {
+    let Some(python) = PYTHONS.into_iter().find(|p| runs(p, "import numpy, scipy")) else {
         skip("the independent check needs python3 with numpy and scipy");
         return None;
-    }
-    let output = Command::new("python3").arg(script).args([quads, source]).arg("--json").output().unwrap();
+    };
+    let output = Command::new(python).arg(script).args([quads, source]).arg("--json").output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{} against {}: {said} {}", quads.display(), source.display(), errors(&output));
     Some(serde_json::from_str(&said).unwrap())

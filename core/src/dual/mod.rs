@@ -25,7 +25,6 @@ pub use bigon_removal::remove_bigons;
 pub use crossings::{Crossing, End};
 pub use error::ArrangementError;
 pub use path_insertion::NoPath;
-pub(crate) use refined_mesh::Cost;
 pub use refined_mesh::{Mark, RefinedMesh, next, prev};
 pub use regions::{Region, Side, SideKind};
 pub use segments::Segment;

@@ -10,9 +10,7 @@
 //! per handle. Edges crossed by the second tree have the number zero. The numbers in the first tree follow from the leaves
 //! to the root.
 
-use std::collections::VecDeque;
-
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::SurfaceCurve;
 
 /// The homology classes of closed curves on a mesh punctured at marks and holes.
@@ -67,23 +65,23 @@ impl HomologyClasses {
 /// around the root is not prescribed. So the root is all holes together, or else a mark; on a closed surface without marks
 /// it is any vertex, whose sum is then zero.
 fn vertex_tree(mesh: &TriMesh, charge: &[u64]) -> Vec<(VertexId, HalfedgeId)> {
-    let (mut tree, mut seen) = (Vec::new(), vec![false; mesh.n_vertices()]);
-    let holes = mesh.vertices().filter(|&v| mesh.is_boundary_vertex(v));
+    let mut tree = Vec::new();
+    let mut search = BreadthFirst::new(mesh.n_vertices());
+    for hole in mesh.vertices().filter(|&v| mesh.is_boundary_vertex(v)) {
+        search.start(hole);
+    }
     let marks = mesh.vertices().filter(|v| charge[v.index()] != 0);
-    let mut queue: VecDeque<VertexId> = holes.collect();
-    queue.iter().for_each(|v| seen[v.index()] = true);
     for root in [None].into_iter().chain(marks.chain(mesh.vertices()).map(Some)) {
-        if let Some(root) = root.filter(|r| !seen[r.index()]) {
-            seen[root.index()] = true;
-            queue.push_back(root);
+        if let Some(root) = root {
+            search.start(root);
         }
-        while let Some(v) = queue.pop_front() {
+        while let Some(v) = search.visit() {
             for h in mesh.outgoing(v) {
                 let w = mesh.target(h);
-                if let Some(back) = mesh.twin(h).filter(|_| !seen[w.index()]) {
-                    seen[w.index()] = true;
+                if let Some(back) = mesh.twin(h)
+                    && search.reach(w, back)
+                {
                     tree.push((w, back));
-                    queue.push_back(w);
                 }
             }
         }

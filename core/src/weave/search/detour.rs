@@ -5,11 +5,10 @@
 //! if they cross each segment equally often modulo two and are homologous modulo two; the shortest of each class is kept.
 //! One of them cuts any region that is not a disc. Classes are told apart by 64-bit hashes: a collision loses a curve.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
-use crate::dual::{Arrangement, Cost, Mark, next};
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::dual::{Arrangement, Mark, next};
+use crate::mesh::{Dijkstra, HalfedgeId, TriMesh};
 use crate::surface::{Crossing, SurfaceCurve};
 use crate::union_find::UnionFind;
 use crate::weave::proposal::Proposal;
@@ -102,23 +101,19 @@ impl Tree {
             let [a, b, c] = refined.corners(f).map(|v| refined.positions[v as usize]);
             (a + b + c) / 3.0
         };
-        tree.distance[root as usize] = 0.0;
-        let mut heap = BinaryHeap::from([Reverse((Cost(0.0), root))]);
-        while let Some(Reverse((Cost(d), f))) = heap.pop() {
-            if d > tree.distance[f as usize] {
-                continue;
+        let mut search = Dijkstra::new(n);
+        search.start(root, 0.0);
+        while let Some((f, d)) = search.settle() {
+            tree.distance[f as usize] = d;
+            if let Some(h) = search.via(f) {
+                tree.entered[f as usize] = h;
+                tree.class[f as usize] = tree.class[(h / 3) as usize] ^ segment_class(arrangement, h);
             }
             for h in 3 * f..3 * f + 3 {
                 let Some(t) = refined.twin(h) else { continue };
                 let g = t / 3;
-                let pass = if refined.mark(h) == Mark::Free { 0.0 } else { CROSSING_COST };
-                let reach = d + centre(f).distance(centre(g)) + pass;
-                if reach < tree.distance[g as usize] {
-                    tree.distance[g as usize] = reach;
-                    tree.entered[g as usize] = h;
-                    tree.class[g as usize] = tree.class[f as usize] ^ segment_class(arrangement, h);
-                    heap.push(Reverse((Cost(reach), g)));
-                }
+                let crossing = if refined.mark(h) == Mark::Free { 0.0 } else { CROSSING_COST };
+                search.reach(g, d + centre(f).distance(centre(g)) + crossing, h);
             }
         }
         tree

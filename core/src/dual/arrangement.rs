@@ -18,13 +18,13 @@ use crate::surface::SurfaceCurve;
 pub struct Arrangement {
     /// The mesh with all curves as paths of edges.
     pub refined: RefinedMesh,
-    /// All crossings, by vertex.
+    /// All crossings, sorted by vertex.
     pub crossings: Vec<Crossing>,
-    /// All ends on the boundary, by vertex.
+    /// All ends on the boundary, sorted by vertex.
     pub ends: Vec<End>,
     /// All segments.
     pub segments: Vec<Segment>,
-    /// All regions, by their first triangle.
+    /// All regions, sorted by their first triangle.
     pub regions: Vec<Region>,
     /// Region of each triangle of the refined mesh.
     pub region_of_face: Vec<u32>,
@@ -38,7 +38,7 @@ impl Arrangement {
     ///
     /// # Errors
     ///
-    /// If a curve does not lie on the mesh. The other errors mean a defect of curve insertion and have not been seen.
+    /// [`ArrangementError::Curve`] if a curve does not lie on the mesh. The others mean a defect of curve insertion.
     pub fn new<'c>(
         base: &TriMesh,
         curves: impl IntoIterator<Item = &'c SurfaceCurve>,
@@ -51,7 +51,7 @@ impl Arrangement {
     ///
     /// # Errors
     ///
-    /// If the marked edges are not curves that cross transversally.
+    /// [`ArrangementError::Degree`] if the marked edges are not curves that cross transversally.
     pub(crate) fn from_marked_mesh(refined: RefinedMesh, n_base_vertices: usize) -> Result<Self, ArrangementError> {
         Self::read(refined, n_base_vertices)?.subdivided()
     }
@@ -122,7 +122,8 @@ impl Arrangement {
         self.segment_of[h as usize]
     }
 
-    /// The half-edges of a curve in order, in one of its two directions: from end to end, or once around.
+    /// The half-edges of a curve in order, in one of its two directions: from end to end, or once around. Empty if there is
+    /// no such curve.
     pub fn curve_halfedges(&self, curve: u32) -> Vec<u32> {
         let refined = &self.refined;
         let of_curve = |h: &u32| refined.mark(*h) == Mark::Curve(curve);

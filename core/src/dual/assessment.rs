@@ -108,13 +108,13 @@ pub struct RegionReport {
     pub valence: usize,
     /// Integral of the Gaussian curvature over the region plus that of the boundary's geodesic curvature, in radians.
     pub curvature: f64,
-    /// Area, in units of the mesh.
+    /// Area, in squared units of the mesh.
     pub area: f64,
-    /// Pronounced corners of the shape in the region: vertex, and index in quarters.
+    /// Pronounced corners of the shape in the region: vertex, and index of the cross field there in quarter turns.
     pub corners: Vec<(VertexId, i8)>,
 }
 
-/// Curvature of each vertex of `mesh`, in radians: the angle defect, on the boundary the turning angle.
+/// Discrete Gaussian curvature at each vertex of `mesh`, in radians: the angle defect, on the boundary the turning angle.
 pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
     let one = |v| {
         let angle: f64 = mesh.outgoing(v).map(|h| mesh.corner_angle(h)).sum();
@@ -127,7 +127,7 @@ pub fn vertex_curvatures(mesh: &TriMesh) -> Vec<f64> {
 /// Assesses every region of `arrangement`.
 ///
 /// `curvatures` are the [`vertex_curvatures`] of the mesh before refinement, `corners` its pronounced corners: vertex, and
-/// index in quarters.
+/// index of the cross field there in quarter turns.
 pub fn assess(arrangement: &Arrangement, curvatures: &[f64], corners: &[(VertexId, i8)]) -> Vec<RegionReport> {
     let region_of_vertex = |v: VertexId| {
         let h = arrangement.refined.vertex_halfedge(v.0);
@@ -165,7 +165,7 @@ fn assess_region(
     if !red && valence == 2 && region.boundary_stretches() == 0 {
         findings.push(Finding::Digon);
     }
-    // A node of valence v takes the curvature ½π (4 − v), on the boundary ½π (2 − v).
+    // The index of a node of valence v corresponds to a curvature of ½π (4 − v), on the boundary ½π (2 − v).
     let flat = if region.boundary_stretches() > 0 { 2.0 } else { 4.0 };
     let ideal = flat - 2.0 * curvature / PI;
     if !red && (valence as f64 - ideal).abs() > 1.0 {
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn vertex_curvatures_sum_to_the_euler_characteristic() {
+    fn vertex_curvatures_satisfy_gauss_bonnet() {
         for mesh in [torus(8, 6), square(4)] {
             let total: f64 = vertex_curvatures(&mesh).iter().sum();
             assert!((total - 2.0 * PI * mesh.euler_characteristic() as f64).abs() < 1e-9);

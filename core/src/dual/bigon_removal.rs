@@ -1,8 +1,8 @@
-//! Removal of bigons: pairs of crossings of two curves that are not necessary.
+//! Removal of bigons: pairs of crossings of two curves that a homotopy can remove.
 //!
-//! Two curves that cross twice in a row, and run close to each other in between, exchange these stretches. Such bigons arise
-//! when curves that run side by side, or cross at a small angle, are mapped onto another mesh, and span a few triangles.
-//! Larger bigons are kept, as they may not be contractible.
+//! Where two curves cross twice in a row and run close to each other in between, their stretches between the two crossings
+//! are exchanged. Such bigons arise when curves that run side by side, or cross at a small angle, are mapped onto another
+//! mesh, and span a few triangles. Larger bigons are kept, as they may not be contractible.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ use crate::surface::{Crossing, SurfaceCurve};
 
 /// Largest number of mesh edges that the two stretches of a bigon cross together. Chosen by hand.
 const MAX_STRETCH_EDGES: usize = 24;
-/// Largest number of bigons removed: a safeguard far above the number that occurs.
+/// Largest number of bigons removed, far above the number that occurs: the loop ends even if an exchange adds crossings.
 const MAX_BIGONS: usize = 1000;
 
 /// A position on a curve.
@@ -200,7 +200,7 @@ fn replace_stretches(crossings: &[Crossing], mut replacements: Vec<&(Stretch, Ve
     new
 }
 
-/// Removes pairs of consecutive crossings over an edge and straight back.
+/// Removes pairs of consecutive crossings of an edge and back.
 fn without_backtracking(mesh: &TriMesh, crossings: Vec<Crossing>, closed: bool) -> Vec<Crossing> {
     let goes_back = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
     let mut kept: Vec<Crossing> = Vec::with_capacity(crossings.len());

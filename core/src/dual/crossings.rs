@@ -31,7 +31,7 @@ pub(super) fn crossing_index(crossings: &[Crossing], v: u32) -> Option<usize> {
     crossings.binary_search_by_key(&v, |c| c.vertex).ok()
 }
 
-/// All crossings and ends, by vertex. The segments of ends are not known yet.
+/// All crossings and ends, sorted by vertex. The segments of ends are not set yet.
 pub(super) fn crossings_and_ends(refined: &RefinedMesh) -> Result<(Vec<Crossing>, Vec<End>), ArrangementError> {
     let (mut crossings, mut ends) = (Vec::new(), Vec::new());
     let mut degree = vec![0u8; refined.n_vertices()];

@@ -104,6 +104,7 @@ impl<'m> CurveInserter<'m> {
         let (high, after) = list.get(slot).copied().unwrap_or((1.0, to.0));
         let at = if along - low < GAP || high - along < GAP { 0.5 * (low + high) } else { along };
         let sub = self.sub_edge(before, after, edge).ok_or(NoPath { from: before, to: after })?;
+        // In space the vertex stays a hundredth of the edge away from its neighbours, so that no edge has length zero.
         let fraction = ((at - low) / (high - low)).clamp(0.01, 0.99);
         let fraction = if self.refined.origin(sub) == before { fraction } else { 1.0 - fraction };
         let x = self.refined.split_edge(sub, fraction);

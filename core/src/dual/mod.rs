@@ -2,8 +2,8 @@
 //! layout.
 //!
 //! After Campen, *Quad Layouts*, sections 2.1, 5.1 and 7.2. Curves are inserted into a refined mesh as paths of edges, so
-//! that the arrangement is combinatorial. The room uses [`crate::mesh`] and [`crate::surface`]. It does not know how curves
-//! are found, nor layouts.
+//! that the arrangement is combinatorial. Dependencies: [`crate::mesh`] and [`crate::surface`]. The module knows neither
+//! how curves are found nor layouts.
 
 mod arrangement;
 mod assessment;

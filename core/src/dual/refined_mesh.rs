@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::{TriMesh, TriMeshError, VertexId};
 
-/// "No element" in the flat arrays.
+/// The index that stands for no element in the flat arrays.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// What runs along an edge of a [`RefinedMesh`].
@@ -160,7 +160,7 @@ impl RefinedMesh {
         list
     }
 
-    /// Half-edge from `a` to `b`, or from `b` to `a` if only that exists.
+    /// Half-edge from `a` to `b`, or from `b` to `a` if only that exists, as on the boundary; `None` without an edge.
     pub fn find(&self, a: u32, b: u32) -> Option<u32> {
         self.outgoing(a).into_iter().find_map(|h| {
             if self.target(h) == b {

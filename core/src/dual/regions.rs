@@ -26,7 +26,7 @@ pub enum SideKind {
 /// One side of a region, traversed with the region to the left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
-    /// What it is.
+    /// Whether it is a segment, a ring or a stretch of boundary.
     pub kind: SideKind,
     /// Its half-edges in order; all belong to triangles of the region.
     pub halfedges: Vec<u32>,

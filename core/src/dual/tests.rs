@@ -113,7 +113,8 @@ fn crossing_numbers(a: &Arrangement) -> BTreeMap<[u32; 2], usize> {
     numbers
 }
 
-/// What an arrangement is, whatever its triangles: its counts, and its regions with the vertices of the surface in them.
+/// The invariants of an arrangement under retriangulation: its counts, and its regions with the vertices of the surface in
+/// them.
 fn combinatorics(a: &Arrangement) -> (BTreeMap<[u32; 2], usize>, [usize; 2], Vec<(BTreeSet<u32>, i64, usize, usize)>) {
     let mut inside = vec![BTreeSet::new(); a.regions.len()];
     for v in 0..a.n_base_vertices() as u32 {

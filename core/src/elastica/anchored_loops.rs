@@ -4,7 +4,7 @@
 //! leaves the latter.
 //!
 //! 1. *Legs*: a bidirectional search finds the least cost of each leg alone, in any allowed direction at its ends. The sum
-//!    is a lower bound of the round.
+//!    is a lower bound of the cost of a loop through all anchors, a round.
 //! 2. *Cost to go*: for a limit slightly above the bound, a search over all legs, backwards from the start anchor, finds the
 //!    exact least cost of the remaining round from each state, in any direction at the start. The bounds of the legs before
 //!    restrict it to states that can lie on a round below the limit.
@@ -13,7 +13,7 @@
 //!
 //! The start is the anchor with the fewest directions. If all anchors have a direction, step 1 gives the exact cost.
 //!
-//! The source runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
+//! The thesis runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
 
 use glam::DVec3;
 
@@ -39,7 +39,7 @@ const LIMIT_GROWTH: f32 = 1.3;
 pub struct Anchor {
     /// The vertex.
     pub vertex: VertexId,
-    /// The direction; the open geodesic nearest to it is used.
+    /// The direction, of any length; the open geodesic nearest to it is used. `None`: any direction.
     pub direction: Option<DVec3>,
 }
 
@@ -100,7 +100,7 @@ impl ElasticaGraph {
 struct AnchoredSearch<'a> {
     graph: &'a ElasticaGraph,
     mask: &'a DirectionMask,
-    /// Per anchor: the states by which the loop may leave it (ξᵢ in the source), sorted.
+    /// Per anchor: the states by which the loop may leave it (ξᵢ in the thesis), sorted.
     departures: Vec<Vec<State>>,
     /// Per leg: the least cost.
     leg_costs: Vec<f32>,

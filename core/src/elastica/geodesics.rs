@@ -17,7 +17,7 @@ use crate::progress::{Cancelled, Progress};
 /// thousands of geodesics would nearly coincide.
 const MAX_GEODESICS: usize = 250;
 
-/// Largest number of vertices of a `k`-ring, for the same reason.
+/// Largest number of vertices of a `k`-ring, inner rings first. Only vertices with many sliver triangles reach it.
 const MAX_RING: usize = 1000;
 
 /// Lower bound of the length of a geodesic, so that the bending cost, which divides by it, stays finite. Chosen by hand;
@@ -44,10 +44,11 @@ pub(super) struct Geodesic {
     pub(super) midpoint_angle: f32,
 }
 
-/// The `k`-ring of a vertex; reusable.
+/// The `k`-ring of a vertex; the memory is reused from vertex to vertex.
 struct Rings {
-    /// Per vertex: the centre of the last ring it was in.
+    /// Per vertex: the vertex whose `k`-ring it was last in.
     mark: Vec<u32>,
+    /// The vertices of the present `k`-ring, its centre first.
     members: Vec<VertexId>,
 }
 
@@ -102,7 +103,7 @@ pub(super) fn geodesics(
         })
         .collect::<Result<_, Cancelled>>()?;
     let limits: Vec<f32> = chunks.iter().flat_map(|c| &c.1).copied().collect();
-    // A geodesic stays if both ends want it.
+    // A geodesic is kept if it is among the shortest of both ends; mesh edges are always kept.
     let kept = |g: &Geodesic| g.ends.iter().all(|&v| g.length <= limits[v as usize]) || is_edge(mesh, g);
     Ok(chunks.iter().flat_map(|c| &c.0).copied().filter(kept).collect())
 }
@@ -144,7 +145,7 @@ fn from_vertex(
             }
         },
     );
-    // To each vertex the mesh edge stays, or else the shortest geodesic.
+    // Of several geodesics to a vertex the mesh edge is kept, or else the shortest.
     found.sort_by(|a, b| {
         let key = |g: &UnfoldedGeodesic| (g.target, !g.is_edge());
         key(a).cmp(&key(b)).then(a.length.total_cmp(&b.length))

@@ -20,7 +20,7 @@ use crate::mesh::{TriMesh, VertexId};
 /// Index of a state, a directed geodesic of `g`.
 pub(super) type State = u32;
 
-/// "No state".
+/// The index that stands for no state.
 pub(super) const NO_STATE: State = u32::MAX;
 
 /// The numbers of a state that its step costs depend on.
@@ -78,7 +78,7 @@ pub struct ElasticaGraph {
 }
 
 impl ElasticaGraph {
-    /// The mesh the graph lies on.
+    /// The mesh that the graph was built on.
     pub fn mesh(&self) -> &Arc<TriMesh> {
         &self.mesh
     }

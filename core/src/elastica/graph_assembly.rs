@@ -82,7 +82,8 @@ fn check_length(given: usize, expected: usize) -> Result<(), ElasticaError> {
     if given == expected { Ok(()) } else { Err(ElasticaError::WrongLength { given, expected }) }
 }
 
-/// The tangent angle at which a way leaves. Way `2 i` is geodesic `i` from its first end, way `2 i + 1` from its second.
+/// The tangent angle at which a way leaves its first vertex. A way is a directed geodesic before states are numbered: way
+/// `2 i` is geodesic `i` from its first end, way `2 i + 1` from its second.
 fn out_angle(all: &[Geodesic], way: u32) -> f32 {
     all[way as usize / 2].angles[way as usize % 2]
 }

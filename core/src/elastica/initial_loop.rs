@@ -1,8 +1,8 @@
 //! A first loop through a vertex, made from a loop found nearby.
 //!
-//! When the pointer moves a little, almost the same loop is searched again. The last loop, with a short detour through the
-//! new vertex, is a valid loop of the graph. It can be shown at once, and its cost bounds the search from the start. The
-//! search decides whether it is the cheapest.
+//! In interactive use, consecutive queries are at nearby vertices and have almost the same result. The last loop, with a
+//! short detour through the new vertex, is a valid loop of the graph. It can be shown at once, and its cost bounds the
+//! search from the start. The search decides whether it is the cheapest.
 
 use std::collections::HashMap;
 

@@ -5,7 +5,8 @@
 //! direction, and an edge of `g′` has a cost for its turning angle. The cost of a cycle of `g′` approximates the elastica
 //! energy (8.1).
 //!
-//! The room uses [`crate::mesh`] and [`crate::surface`]. It does not know strips, layouts or the user interface.
+//! Dependencies: [`crate::mesh`], [`crate::surface`] and [`crate::progress`]. The module does not know strips, layouts or
+//! the user interface.
 
 mod alignment_cost;
 mod anchored_loops;

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::progress::Cancelled;
 
-/// Weights and size of the elastica graph.
+/// Weights and size of the elastica graph. The equations and sections are those of Campen, *Quad Layouts*.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElasticaOptions {
     /// Number of rings `k`: each vertex is joined to the vertices of its `k`-ring. 3 to 5 are useful, 1 to 8 are

@@ -24,8 +24,8 @@ const SAME_LENGTH: f64 = 1.3;
 /// kept; at a larger angle they are different strips (Campen, section 8.2.2).
 const SAME_DIRECTION: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Alternatives are searched up to this multiple of the cost of the cheapest route, if that route is contractible and so is
-/// no loop. Chosen by hand.
+/// If all routes up to the factor of the query are contractible, and therefore no loops, the search is repeated up to this
+/// multiple of the cost of the cheapest route. Chosen by hand.
 const FALLBACK_FACTOR: f64 = 2.0;
 
 /// Number of states settled after the first loop is found and before it is shown: about one millisecond, in which most
@@ -55,7 +55,8 @@ pub struct ProposalQuery<'a> {
     pub factor: f64,
     /// Largest number of loops returned.
     pub max: usize,
-    /// Each alternative is somewhere farther than this from every cheaper loop (in mesh units, measured along edges).
+    /// Each alternative has a vertex farther than this from every cheaper loop of similar length (in mesh units, measured
+    /// along edges).
     pub separation: f64,
     /// If given, of homologous loops that pass the vertex in about the same direction only the cheapest is returned.
     pub classes: Option<&'a HomologyClasses>,
@@ -67,7 +68,8 @@ pub struct ProposalQuery<'a> {
 }
 
 impl<'a> ProposalQuery<'a> {
-    /// The cheapest loop through a vertex. The budget, about a second, suffices for a proof on ordinary meshes.
+    /// The cheapest loop through a vertex, in any direction. The budget, about a second, suffices for a proof on ordinary
+    /// meshes. The separation of 0.05, on a surface of diagonal 1, only matters for alternatives.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
         Self {
             vertex,
@@ -95,7 +97,7 @@ pub struct FoundLoop {
     pub curve: SurfaceCurve,
     /// Elastica cost, the sum of the following three terms; a length, on a surface of diagonal 1.
     pub cost: f64,
-    /// Length.
+    /// Length of the geodesics, with rounded corners as in (8.2); on a surface of diagonal 1.
     pub length: f64,
     /// Weighted alignment cost.
     pub alignment: f64,

@@ -15,6 +15,7 @@ use super::route::Route;
 #[derive(Debug, Default)]
 pub(super) struct SectorMemory {
     sector_field: DistanceField,
+    /// Distances of the A* search in one direction.
     pub(super) star: DistanceField,
 }
 

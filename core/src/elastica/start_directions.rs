@@ -16,9 +16,10 @@ use super::sectors::Sectors;
 /// up to this and twice the largest turn. Measured: widths from 0.25 to 0.8 take nearly the same time.
 const SECTOR_WIDTH: f64 = 0.5;
 
-/// Number of states that an A* search may settle before a sector field is computed instead: at least this many ...
+/// Number of states that an A* search may settle before a sector field is computed instead: the number settled in the ball
+/// and the corridor divided by `DIRECT_DIVISOR`, but at least `DIRECT_LEAST`. Chosen by hand.
 const DIRECT_LEAST: u64 = 500;
-/// ... and the number of states settled in the ball and the corridor, divided by this. Chosen by hand.
+/// See [`DIRECT_LEAST`].
 const DIRECT_DIVISOR: u64 = 16;
 
 impl LoopSearch<'_> {

@@ -1,6 +1,6 @@
 //! Steps between states, the edges of `g′`: which states may follow a state, and at what cost.
 //!
-//! The cost of a step is (8.2) of the source, for geodesics `e`, `f` that meet at the turning angle γ:
+//! The cost of a step is equation (8.2) of the thesis, for geodesics `e`, `f` that meet at the turning angle γ:
 //!
 //! `w(e, f) = |e′| (1 + α ½ (q(e) + q(f))) + β γ² / m`, with `m = min(|e|, |f|)` and
 //! `|e′| = γ m / (2 tan ½γ) + ½ ||e| − |f||`.
@@ -55,6 +55,8 @@ impl ElasticaGraph {
         costs
     }
 
+    /// The range of states that leave the target of `e` within the largest turning angle; the index of its costs is not
+    /// set.
     fn find_successors(&self, e: State) -> Successors {
         let states = self.outgoing(self.target(e));
         let n = (states.end - states.start) as usize;
@@ -149,13 +151,14 @@ impl ElasticaGraph {
         [length, self.options.alpha as f32 * g.alignment * length, 0.0]
     }
 
-    /// Cost of half a state.
+    /// The sum of [`Self::half_terms`].
     #[inline]
     pub(super) fn half_cost(&self, e: State) -> f32 {
         self.half_terms(e).iter().sum()
     }
 }
 
+/// Turning angle between two geodesics that meet, from 0 to π.
 #[inline]
 fn turn(from: &DirectedGeodesic, to: &DirectedGeodesic) -> f32 {
     ((to.out_angle - from.back_angle).abs() - PI).abs()
@@ -191,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_costs_as_in_the_source() {
+    fn a_turn_costs_as_in_equation_8_2() {
         let (beta, m) = (0.25, 0.1f64);
         for degrees in [1.0f64, 10.0, 30.0] {
             let turn = degrees.to_radians();

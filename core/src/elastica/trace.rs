@@ -2,8 +2,8 @@
 //!
 //! A route passes through vertices; a curve must not. So the curve passes each vertex on its left, through the fan of
 //! triangles between the arriving and the leaving geodesic. A geodesic along a mesh edge runs in the triangle left of it.
-//! Where the boundary is in the way, the curve passes on the right. Crossings of an edge and straight back are removed, so
-//! that the curve crosses each edge because of its homotopy class.
+//! Where the boundary is in the way, the curve passes on the right. Consecutive crossings of an edge and back are removed,
+//! so that the edges crossed depend on the homotopy class only.
 
 use super::geodesics::edge_between;
 use super::graph::{ElasticaGraph, State};
@@ -137,7 +137,7 @@ fn to_boundary(mesh: &TriMesh, from: HalfedgeId) -> Option<Vec<Crossing>> {
         .min_by_key(Vec::len)
 }
 
-/// Removes pairs of consecutive crossings over an edge and straight back.
+/// Removes pairs of consecutive crossings of an edge and back.
 fn without_backtracking(mesh: &TriMesh, crossings: &[Crossing], closed: bool) -> Vec<Crossing> {
     let goes_back = |a: &Crossing, b: &Crossing| mesh.twin(a.halfedge) == Some(b.halfedge);
     let mut kept: Vec<Crossing> = Vec::with_capacity(crossings.len());
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn crossings_straight_back_are_removed() {
+    fn crossings_of_an_edge_and_back_are_removed() {
         let mesh = torus(8, 6);
         let curve = row(8, 2, true, 0.4).crossings;
         // Out and back over two edges, inside the list.

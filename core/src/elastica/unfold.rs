@@ -154,7 +154,7 @@ struct Window {
     parent: u32,
 }
 
-/// The windows of an unfolding; reusable.
+/// The windows of an unfolding; the memory is reused from source to source.
 #[derive(Debug, Default)]
 pub(super) struct Unfolding {
     windows: Vec<Window>,

@@ -9,10 +9,11 @@ use super::graph::State;
 use super::open_curves::BoundarySearchMemory;
 use super::sectors::SectorMemory;
 
-/// Memory of searches, to be kept between them. It is for one graph at a time and never needs to be cleared.
+/// Memory of searches, to be kept between them. One search uses it at a time; the next may be on another graph, and nothing
+/// needs to be cleared.
 #[derive(Debug, Default)]
 pub struct SearchWorkspace {
-    /// Distances from the vertex searched at; also the forward front of a bidirectional search.
+    /// Distances from the vertex of the query; also the forward front of a bidirectional search.
     pub(super) root: DistanceField,
     /// The states settled in the ball.
     pub(super) ball: Vec<State>,

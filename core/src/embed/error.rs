@@ -27,7 +27,8 @@ pub enum EmbeddingError {
         /// The arc.
         arc: usize,
     },
-    /// No edge of the initial embedding crosses or covers an edge of the surface.
+    /// An edge of the surface that no half-edge of the initial embedding lies on: the embedding is not one of this
+    /// surface.
     #[error("the initial embedding does not cover {edge:?} of the surface")]
     Edge {
         /// The edge.
@@ -74,7 +75,7 @@ pub enum EmbeddingError {
     /// The map could not be computed.
     #[error(transparent)]
     Param(#[from] ParamError),
-    /// Stopped from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

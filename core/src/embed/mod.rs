@@ -1,6 +1,6 @@
 //! The optimised embedding of quad layouts: along principal directions, without flipped triangles (Campen, chapter 6).
 //!
-//! Data flows through the sub-rooms in this order, and each knows only those before it:
+//! Data flows through the submodules in this order, and each knows only those before it:
 //!
 //! - `topology`: the layout on the triangles of the surface, every arc up to homotopy.
 //! - `parameterise`: for nodes at given vertices, a cross field with exactly the layout's singularities and a
@@ -10,7 +10,7 @@
 //!   become isolines.
 //! - `pipeline`: the phases of an optimisation, from the initial embedding to the result.
 //!
-//! `problem` is the input, [`optimise_embedding`] the entry. The room knows layouts and initial embeddings, not how
+//! `problem` is the input, [`optimise_embedding`] the entry. The module knows layouts and initial embeddings, not how
 //! they came about.
 
 mod error;

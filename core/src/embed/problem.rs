@@ -25,14 +25,14 @@ pub struct Settings {
     pub steps: usize,
     /// Largest number of successive halvings of the step size; an injective map takes at most 2.
     pub halvings: usize,
-    /// Anisotropy ρ of the norm: by what factor misalignment counts more than sizing error (section 6.4.3); at least 1.
+    /// Anisotropy ρ of the norm: weight of misalignment relative to that of sizing error (section 6.4.3); at least 1.
     pub anisotropy: f64,
     /// Whether target lengths vary over the surface so that the sized field has less curl.
     pub sizing: bool,
     /// Least length of an arc in the map, as a multiple of the mean edge length of the mesh.
     pub spacing: f64,
-    /// Length below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: such chords are kept
-    /// at the least length.
+    /// Length in the map below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: no chord
+    /// is, and short ones keep the least length.
     pub collapse: Option<f64>,
     /// Whether chords are collapsed one by one as long as that makes the layout less irregular without raising the
     /// energy.

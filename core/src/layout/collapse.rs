@@ -11,10 +11,11 @@ use thiserror::Error;
 use super::structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 use crate::union_find::UnionFind;
 
-/// Admissible valences of a merged inner node; more if a node before the merge has more. Two patches at a node would
-/// cover each other, and triangles of usual meshes can hardly span seven or more quarter turns without flips.
+/// Admissible valences of a merged inner node; the upper bound is raised to the largest valence of the nodes merged.
+/// Two patches at a node of valence 2 would be degenerate, and the few triangles at a vertex of a usual mesh can hardly
+/// span seven or more quarter turns without flips.
 const INNER_VALENCES: std::ops::RangeInclusive<usize> = 3..=6;
-/// Admissible valences of a merged boundary node, likewise.
+/// Admissible valences of a merged boundary node, with the same exception.
 const BOUNDARY_VALENCES: std::ops::RangeInclusive<usize> = 1..=3;
 
 /// A layout after deletion of chords, with maps from the nodes, arcs, patches and chords before.

@@ -4,9 +4,10 @@
 //! Cotangent weights map a flat disc to itself, but they may be negative and, in slivers, arbitrarily large. Where they
 //! flip triangles they are clamped to a positive range.
 //!
-//! A harmonic map shrinks limbs to almost nothing. Dividing the weights by the stretch at both ends of each edge and
-//! solving again gives limbs more room (Yoshizawa, Belyaev and Seidel: A fast and simple stretch-minimizing mesh
-//! parameterization, 2004). Injectivity holds in exact arithmetic; each map is checked for count_flipped triangles.
+//! A harmonic map shrinks protrusions to almost nothing. Dividing the weights by the stretch at both ends of each edge
+//! and solving again enlarges them (Yoshizawa, Belyaev and Seidel: A fast and simple stretch-minimizing mesh
+//! parameterization, 2004). Injectivity holds in exact arithmetic; because of rounding errors each map is checked for
+//! flipped triangles.
 
 use glam::DVec2;
 
@@ -17,13 +18,13 @@ use crate::solve::{SolveError, SparseHermitian, SpdFactor};
 /// Bounds of clamped edge weights. In an equilateral mesh all weights are 0.58. The lower bound keeps weights positive;
 /// a ratio of 1000 does not harm the solver.
 const WEIGHT_RANGE: (f64, f64) = (0.01, 10.0);
-/// Most rounds of stretch minimisation; most discs need two or three.
+/// Largest number of rounds of stretch minimisation. Usually two or three suffice.
 const MAX_ROUNDS: usize = 8;
 /// Ratio of the stretch to that of the last round above which no further round follows.
 const MAX_STRETCH_RATIO: f64 = 0.9;
 /// Bounds of the factor by which a round changes a weight for one of its ends.
 const FACTOR_RANGE: (f64, f64) = (1e-2, 1e2);
-/// Least sine of an angle in a cotangent; bounds weights in degenerate triangles.
+/// Lower bound of the sine of an angle in a cotangent: it bounds the weights of degenerate triangles.
 const MIN_SINE: f64 = 1e-6;
 
 /// The weights of the first harmonic map.
@@ -31,7 +32,8 @@ const MIN_SINE: f64 = 1e-6;
 pub(crate) enum InitialWeights {
     /// Cotangents, unless they flip triangles: they preserve angles best.
     Cotangent,
-    /// Cotangents clamped to a positive range: slivers keep some width, so that paths can be inserted across them.
+    /// Cotangents clamped to a positive range: the images of slivers keep some width, so that paths can be inserted
+    /// across them.
     Clamped,
 }
 
@@ -117,7 +119,8 @@ fn cotangents(mesh: &TriMesh, h: HalfedgeId) -> f64 {
     0.5 * (cot(h) + mesh.twin(h).map_or(0.0, cot))
 }
 
-/// The map in which every vertex that is not fixed is the weighted mean of its neighbours.
+/// The map in which every vertex that is not fixed is the mean of its neighbours, weighted by the `weights` of its
+/// edges.
 fn solve(mesh: &TriMesh, fixed: &[Option<DVec2>], weights: &[f64]) -> Result<Vec<DVec2>, SolveError> {
     let mut unknown = vec![u32::MAX; mesh.n_vertices()];
     let mut n = 0;
@@ -206,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_minimisation_enlarges_limbs_without_flips() {
+    fn stretch_minimisation_enlarges_protrusions_without_flips() {
         let bump = |u: f64, v: f64| 2.0 * (-40.0 * ((u - 0.5).powi(2) + (v - 0.5).powi(2))).exp();
         let mesh = grid(24, 24, [false, false], |u, v| glam::DVec3::new(u, v, bump(u, v)));
         let fixed: Vec<Option<DVec2>> =

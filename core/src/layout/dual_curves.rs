@@ -33,7 +33,7 @@ pub enum DualCurvesError {
     Solve {
         /// The patch.
         patch: usize,
-        /// What the solver says.
+        /// The error of the solver.
         source: SolveError,
     },
     /// There is no path for a dual curve.
@@ -41,7 +41,7 @@ pub enum DualCurvesError {
     Path {
         /// The patch.
         patch: usize,
-        /// Where the path ends.
+        /// The vertices that no path joins.
         source: NoPath,
     },
     /// The dual curves do not form an arrangement.
@@ -50,7 +50,7 @@ pub enum DualCurvesError {
     /// The patches do not form a manifold.
     #[error("the patches of the embedding do not form a manifold: {0}")]
     Mesh(#[from] TriMeshError),
-    /// Cancelled from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -63,7 +63,7 @@ pub(super) struct DualCurves {
     pub base_face: Vec<u32>,
     /// The embedding, refined such that every arc has an inner vertex.
     pub embedding: Embedding,
-    /// For each arc the vertex at which the dual curve crosses it.
+    /// For each arc its vertex nearest to the middle; a dual curve crosses the arc there.
     pub middles: Vec<u32>,
 }
 

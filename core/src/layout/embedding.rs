@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use crate::dual::RefinedMesh;
 
-/// Least length of a step of a path. A shorter one counts as this long, so that parameters along a path strictly
-/// increase.
+/// Least length of an edge of a path, in units of the mesh. A shorter one counts as this long, so that parameters along
+/// a path strictly increase.
 const MIN_STEP: f64 = 1e-9;
 
 /// A layout embedded on a refinement of the surface: nodes as vertices, arcs as edge paths.

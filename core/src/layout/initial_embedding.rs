@@ -32,7 +32,7 @@ pub enum InitialEmbeddingError {
     NoDisc {
         /// The region.
         region: usize,
-        /// What the mesh kernel says.
+        /// Why its triangles are not a manifold mesh.
         source: TriMeshError,
     },
     /// The map of a region could not be computed.
@@ -40,7 +40,7 @@ pub enum InitialEmbeddingError {
     Solve {
         /// The region.
         region: usize,
-        /// What the solver says.
+        /// The error of the solver.
         source: SolveError,
     },
     /// There is no path for a half arc.
@@ -48,7 +48,7 @@ pub enum InitialEmbeddingError {
     Path {
         /// The region.
         region: usize,
-        /// Where the path ends.
+        /// The vertices that no path joins.
         source: NoPath,
     },
     /// A half arc is missing. This is a defect of the arrangement.
@@ -60,7 +60,7 @@ pub enum InitialEmbeddingError {
     /// The regions do not form a manifold.
     #[error("the embedded layout is not a manifold: {0}")]
     Assemble(#[from] TriMeshError),
-    /// Cancelled from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -106,7 +106,7 @@ fn middles(arrangement: &Arrangement) -> Vec<u32> {
     arrangement.segments.iter().map(|s| middle(&s.halfedges)).collect()
 }
 
-/// A region with its node and half arcs.
+/// A region with its node and the halves of arcs from the node to its sides.
 struct RegionPart {
     mesh: RefinedMesh,
     /// Vertex of the arrangement's mesh for each of the first vertices; the others are new.
@@ -114,7 +114,7 @@ struct RegionPart {
     /// Faces of the arrangement's mesh that form the region.
     faces: Vec<u32>,
     node: u32,
-    /// Half arcs from the node: segment, whether the region lies to its left, vertices.
+    /// Half arcs from the node: segment, whether the region lies to the segment's left, vertices.
     halves: Vec<(u32, bool, Vec<u32>)>,
 }
 

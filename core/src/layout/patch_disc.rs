@@ -24,7 +24,7 @@ pub enum PatchShapeError {
     NoDisc {
         /// The patch.
         patch: usize,
-        /// What the mesh kernel says.
+        /// Why its triangles are not a manifold mesh.
         source: TriMeshError,
     },
 }

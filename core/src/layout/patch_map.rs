@@ -28,10 +28,10 @@ pub enum PatchError {
     Solve {
         /// The patch.
         patch: usize,
-        /// What the solver says.
+        /// The error of the solver.
         source: SolveError,
     },
-    /// Cancelled from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -41,13 +41,13 @@ pub enum PatchError {
 pub struct PatchMap {
     /// The patch as a mesh of its own.
     pub mesh: TriMesh,
-    /// Vertex of the embedding for each of the first vertices; the others lie inside the patch.
+    /// Vertex of the embedding for each of the first vertices of `mesh`; the others were added inside the patch.
     pub parent: Vec<u32>,
     /// Triangle of the original mesh that each face lies in.
     pub base_face: Vec<u32>,
     /// Image of each vertex.
     pub uv: Vec<DVec2>,
-    /// Size of the rectangle.
+    /// Width and height of the rectangle.
     pub size: DVec2,
     /// Number of triangles that the map flips.
     pub flipped: usize,
@@ -94,7 +94,7 @@ fn map_patch(
 ) -> Result<PatchMap, PatchError> {
     let PatchDisc { submesh, faces, sides } = PatchDisc::cut_out(layout, embedding, lookup, p)?;
     let mut refined = RefinedMesh::new(&submesh.mesh);
-    free_the_sides(&mut refined, &sides);
+    split_edges_along_sides(&mut refined, &sides);
     let mesh = refined.to_mesh().map_err(|source| PatchShapeError::NoDisc { patch: p, source })?;
     if mesh.euler_characteristic() != 1 {
         return Err(PatchShapeError::Sides { patch: p }.into());
@@ -109,20 +109,21 @@ fn map_patch(
     Ok(PatchMap { mesh, parent: submesh.parent, base_face, uv, size, flipped })
 }
 
-/// Splits inner edges that join two vertices of one side. On a straight side their triangles would be degenerate.
-fn free_the_sides(mesh: &mut RefinedMesh, sides: &[Vec<u32>; 4]) {
+/// Splits inner edges that join two vertices of one side: the side is mapped to a line, where their triangles would be
+/// degenerate.
+fn split_edges_along_sides(mesh: &mut RefinedMesh, sides: &[Vec<u32>; 4]) {
     let mut on_side = vec![0u8; mesh.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
         for &v in side {
             on_side[v as usize] |= 1 << k;
         }
     }
-    let chords: Vec<(u32, u32)> = (0..3 * mesh.n_faces() as u32)
+    let edges: Vec<(u32, u32)> = (0..3 * mesh.n_faces() as u32)
         .filter(|&h| mesh.twin(h).is_some_and(|t| h < t))
         .map(|h| (mesh.origin(h), mesh.target(h)))
         .filter(|&(a, b)| on_side[a as usize] & on_side[b as usize] != 0)
         .collect();
-    for (a, b) in chords {
+    for (a, b) in edges {
         if let Some(h) = mesh.find(a, b) {
             mesh.split_edge(h, 0.5);
         }

@@ -48,7 +48,7 @@ pub enum ReembeddingError {
     /// The layout could not be embedded.
     #[error(transparent)]
     Embed(#[from] InitialEmbeddingError),
-    /// Cancelled from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -95,9 +95,9 @@ pub fn reembed(
 /// Checks that the dual of the curves has the nodes of the collapsed layout.
 fn check(collapsed: &CollapsedLayout, dual: &QuadLayout, nodes: &[u32]) -> Result<(), ReembeddingError> {
     for (n, &found) in nodes.iter().enumerate() {
-        let (wanted, found) = (&collapsed.layout.nodes[collapsed.nodes[n] as usize], &dual.nodes[found as usize]);
-        if wanted != found {
-            let (valence, corners) = (wanted.valence, found.valence);
+        let (expected, found) = (&collapsed.layout.nodes[collapsed.nodes[n] as usize], &dual.nodes[found as usize]);
+        if expected != found {
+            let (valence, corners) = (expected.valence, found.valence);
             return Err(LayoutError::Valence { node: n, valence, corners }.into());
         }
     }

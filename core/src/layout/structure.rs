@@ -160,7 +160,7 @@ impl QuadLayout {
         Ok(layout)
     }
 
-    /// Numbers the chords.
+    /// Computes the chord of each arc and the number of chords, which must be 0 before.
     pub(crate) fn find_chords(&mut self) {
         let mut sets = UnionFind::new(self.arcs.len());
         for p in &self.patches {
@@ -179,8 +179,8 @@ impl QuadLayout {
         }
     }
 
-    /// Checks that every side joins its corners, that valences equal numbers of corners, and that `|N| − |A| + |P| =
-    /// χ`.
+    /// Checks that every side joins its corners, that valences equal numbers of corners, and that
+    /// `|N| − |A| + |P| = χ`, where χ is `euler`.
     ///
     /// # Errors
     ///
@@ -216,7 +216,7 @@ impl QuadLayout {
         self.nodes.len() as i64 - self.arcs.len() as i64 + self.patches.len() as i64
     }
 
-    /// For each chord the least number of quads across it with which the subdivided layout is a polygonal mesh without
+    /// For each chord the least number of quads across it such that the subdivided layout is a polygonal mesh without
     /// loops, double edges and quads that have a vertex twice.
     pub fn min_quads_per_chord(&self) -> Vec<u32> {
         let mut least = vec![1; self.chords];

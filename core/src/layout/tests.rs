@@ -13,8 +13,8 @@ use crate::progress::Progress;
 use crate::surface::{Crossing, SurfaceCurve};
 use crate::testing::{column, grid, row, square, torus};
 
-/// The layout with three patches per triangle around its centre, embedded on the mesh with each triangle divided into
-/// six: all arcs are single edges, all patches two triangles.
+/// The layout with three patches around the centre of each triangle, embedded on the mesh with each triangle divided
+/// into six: all arcs are single edges, all patches two triangles.
 fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
     let (v, e) = (mesh.n_vertices() as u32, mesh.n_edges() as u32);
     let middle = |h| v + mesh.edge(h).0;
@@ -70,16 +70,17 @@ fn thirds(mesh: &TriMesh) -> (QuadLayout, Embedding) {
     (QuadLayout::new(nodes, arcs, patches, mesh.euler_characteristic()).unwrap(), embedding)
 }
 
+/// A torus, a square, an open cylinder, a ring of cubes and a cube.
 fn surfaces() -> Vec<TriMesh> {
     let open = grid(4, 3, [true, false], |u, v| {
         let a = std::f64::consts::TAU * u;
         DVec3::new(a.cos(), a.sin(), v)
     });
-    let two = crate::field::samples::cells(
+    let ring = crate::field::samples::cells(
         &[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0], [0, 2, 0], [1, 2, 0], [2, 2, 0]],
         1,
     );
-    vec![torus(4, 3), square(3), open, two, crate::field::samples::cells(&[[0, 0, 0]], 1)]
+    vec![torus(4, 3), square(3), open, ring, crate::field::samples::cells(&[[0, 0, 0]], 1)]
 }
 
 /// Four times the sum of all indices, inside and on the boundary.
@@ -132,7 +133,7 @@ fn collapsing_keeps_layouts_valid_and_the_sum_of_indices() {
 }
 
 #[test]
-fn chords_of_a_single_patch_are_kept() {
+fn the_last_chord_that_crosses_another_is_kept() {
     let mesh = square(8);
     let arrangement = Arrangement::new(&mesh, &[row(8, 2, false, 0.5), column(8, 8, 3, false, 0.5)]).unwrap();
     let layout = QuadLayout::dual(&arrangement, &[], 1).unwrap();
@@ -147,7 +148,7 @@ fn chords_of_a_single_patch_are_kept() {
 }
 
 #[test]
-fn merged_nodes_add_their_valences() {
+fn a_merged_node_has_the_sum_of_valences_less_four_per_merge() {
     let (layout, _) = thirds(&torus(4, 3));
     let mut merged = 0;
     for chord in 0..layout.chords as u32 {
@@ -184,7 +185,7 @@ fn check_embedding(mesh: &TriMesh, reembedded: &Reembedded) {
 
 #[test]
 fn collapsed_layouts_are_reembedded_on_all_surfaces() {
-    let mut drawn = 0;
+    let mut embedded = 0;
     for mesh in surfaces() {
         let (layout, embedding) = thirds(&mesh);
         let sixths = embedding.mesh.to_mesh().unwrap();
@@ -205,10 +206,10 @@ fn collapsed_layouts_are_reembedded_on_all_surfaces() {
                 kinds(&reembedded.nodes, &reembedded.layout.nodes),
                 kinds(&collapsed.nodes, &collapsed.layout.nodes)
             );
-            drawn += 1;
+            embedded += 1;
         }
     }
-    assert!(drawn > 10, "{drawn}");
+    assert!(embedded > 10, "{embedded}");
 }
 
 #[test]

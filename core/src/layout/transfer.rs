@@ -55,7 +55,7 @@ pub fn transfer_embedding(
     for (segment, arc) in there.segments.iter().zip(&dual.arcs) {
         chords[segment.curve as usize] = arc.chord;
     }
-    // Patches are matched by the distance of their centres from crossings.
+    // Among several isomorphisms the distances of patch centres from crossings decide.
     let centre = |p: usize| {
         let sides = layout.patches[p].sides;
         sides.map(|(arc, _)| here.embedding.mesh.positions[here.middles[arc as usize] as usize]).iter().sum::<DVec3>()

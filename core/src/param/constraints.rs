@@ -31,8 +31,8 @@ pub(super) fn corner(cut: &CutGraph, h: HalfedgeId, axis: u32) -> (u32, f64) {
     (2 * cut.wedge[h.index()] + component, sign)
 }
 
-/// Priority of each variable to remain free in the elimination: translations, which serve a whole path, before
-/// coordinates.
+/// Priority of each variable to remain free in the elimination, larger for more terms that contain it: translations,
+/// which occur along a whole path, before coordinates.
 pub(super) fn keep(cut: &CutGraph) -> Vec<u32> {
     let mut keep = vec![1; 2 * cut.n_wedges];
     keep.extend(cut.paths.iter().flat_map(|p| [p.steps.len() as u32 + 2; 2]));

@@ -55,8 +55,8 @@ impl CutGraph {
         for v in nodes {
             is_node[v.index()] = true;
         }
-        let (crossed, turn, roots) = comb(mesh, field, &is_node);
-        let is_cut = prune(mesh, crossed, &is_node);
+        let (uncrossed, turn, roots) = comb(mesh, field, &is_node);
+        let is_cut = prune(mesh, uncrossed, &is_node);
         let combed = |h: HalfedgeId| {
             let beyond = mesh.twin(h).map_or(0, |t| turn[t.index() / 3] - turn[h.index() / 3]);
             (field.jump_across(mesh, h) + beyond).rem_euclid(4)
@@ -90,8 +90,8 @@ impl CutGraph {
     }
 }
 
-/// Builds the dual spanning forest and combs the crosses along it. Returns the edges not crossed, the turns and the
-/// roots.
+/// Builds the dual spanning forest and combs the crosses along it. Returns whether each edge is not crossed, the
+/// turns and the roots.
 fn comb(mesh: &TriMesh, field: &CrossField, is_node: &[bool]) -> (Vec<bool>, Vec<i32>, Vec<FaceId>) {
     let priority = crossing_priority(mesh, is_node);
     let mut uncrossed: Vec<bool> = mesh.edges().map(|e| !mesh.is_boundary_edge(e)).collect();

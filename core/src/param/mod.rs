@@ -4,9 +4,10 @@
 //! a number of quarter turns and a translation (Campen, section 6.4; Bommes, section 6.4). The map follows a cross
 //! field in the least-squares sense ([`Objective`]) or minimises an energy that is infinite for flipped triangles
 //! ([`InjectiveEnergy`]); linear constraints on coordinates ([`CoordinateConstraint`]) hold exactly in both.
-//! [`SeamlessSystem`] sets up and solves; [`remove_flips`] repairs flipped triangles of a least-squares map.
+//! [`SeamlessSystem`] sets up and solves the linear systems; [`remove_flips`] removes flipped triangles from a
+//! least-squares map.
 //!
-//! Dependencies: `mesh`, `surface`, `field`, `solve` and `progress`. The module knows nothing of layouts.
+//! Dependencies: `mesh`, `surface`, `field`, `solve` and `progress`. The module does not know layouts.
 
 mod assembly;
 mod constraints;
@@ -84,12 +85,12 @@ pub enum ParamError {
     /// The linear system could not be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// Cancelled from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-/// Checks the length of an array.
+/// Checks that an array has `want` entries.
 fn expect_length(what: &'static str, got: usize, want: usize) -> Result<(), ParamError> {
     if got == want { Ok(()) } else { Err(ParamError::WrongLength { what, got, want }) }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::assembly::Scatter;
 use crate::solve::{Reduction, SolveError, SparseHermitian, SpdSymbolic};
 
-/// Share by which the diagonal is raised. A semidefinite Hessian must become definite beyond rounding errors.
+/// Relative increase of the diagonal, so that a semidefinite Hessian becomes definite beyond rounding errors.
 const DIAGONAL_RAISE: f64 = 1e-9;
 
 /// First and second derivatives of the energy of a triangle by its corner coordinates.

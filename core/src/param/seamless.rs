@@ -41,7 +41,7 @@ impl Transition {
     }
 }
 
-/// `w` after `quarters` quarter turns counter-clockwise; exact.
+/// `w` after `quarters` quarter turns counter-clockwise, without rounding errors.
 pub fn turn(w: DVec2, quarters: i32) -> DVec2 {
     match quarters.rem_euclid(4) {
         0 => w,

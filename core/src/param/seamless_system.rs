@@ -1,7 +1,8 @@
 //! The linear system of seamless maps (Campen, Quad Layouts, section 6.4).
 //!
 //! Constraints are eliminated exactly in two stages: first the seams, then the coordinate constraints. Every corner
-//! coordinate is then an affine expression of free variables. What is computed depends on what has changed:
+//! coordinate is then an affine expression of free variables. After a change only the stages that depend on it are
+//! computed again:
 //!
 //! - The cut graph and the elimination of the seams depend on period jumps and nodes.
 //! - The elimination of the coordinate constraints depends on these and on the constraints.
@@ -111,7 +112,7 @@ impl SeamlessSystem {
         let scatter = Scatter::of_triangles(&cut, &seams);
         let equalities = constraints::linear_constraints(mesh, &cut, constraints)?;
         let reduced = Reduced::new(&seams, &scatter, &equalities)?;
-        let jump = turns(field);
+        let jump = jumps_modulo_4(field);
         let nodes = nodes.to_vec();
         let (symbolic, coupled_scatter, newton) = (None, None, None);
         Ok(Self { cut, jump, seams, scatter, equalities, reduced, symbolic, nodes, coupled_scatter, newton })
@@ -131,7 +132,7 @@ impl SeamlessSystem {
         nodes: &[VertexId],
         constraints: &[CoordinateConstraint],
     ) -> Result<(), ParamError> {
-        if mesh.n_faces() == self.cut.turn.len() && nodes == self.nodes && turns(field) == self.jump {
+        if mesh.n_faces() == self.cut.turn.len() && nodes == self.nodes && jumps_modulo_4(field) == self.jump {
             return self.set_constraints(mesh, constraints);
         }
         let new = Self::new(mesh, field, nodes, constraints)?;
@@ -408,7 +409,7 @@ impl SeamlessSystem {
 }
 
 /// The period jumps of a field, 0 to 3.
-fn turns(field: &CrossField) -> Vec<u8> {
+fn jumps_modulo_4(field: &CrossField) -> Vec<u8> {
     field.jump.iter().map(|p| p.rem_euclid(4) as u8).collect()
 }
 

@@ -9,6 +9,7 @@ use crate::elastica::{DirectionMask, ProposalQuery, SearchWorkspace};
 use crate::mesh::{FaceId, VertexId};
 use crate::progress::Progress;
 
+/// Compares the loops at some vertices with plain Dijkstra.
 fn compare_some(graph: &ElasticaGraph, count: usize) {
     let open = DirectionMask::none();
     let mut compared = 0;

@@ -12,8 +12,8 @@ use crate::elastica::{DirectionMask, SearchWorkspace};
 use crate::mesh::VertexId;
 use crate::progress::Progress;
 
-/// Relative tolerance of costs: both sides sum the same single-precision costs, but in different orders. At most about
-/// hundred additions round by at most 6e-8 each.
+/// Relative tolerance of costs: both sides sum the same single-precision costs, but in different orders. About a hundred
+/// additions at most round by at most 6e-8 each.
 pub(super) const TOLERANCE: f32 = 1e-5;
 
 /// Whether two costs are equal within [`TOLERANCE`]; both may be infinite.
@@ -130,8 +130,8 @@ pub(super) fn compare_open_curves(g: &ElasticaGraph, mask: &DirectionMask, v: Ve
     best
 }
 
-/// The cheapest round through anchors, by the graph of distances of the source: the loop leaves anchor `i` by one of
-/// `departures[i]`.
+/// The cost of the cheapest round through anchors, by the graph of distances of the thesis: the loop leaves anchor `i` by
+/// one of `departures[i]`.
 pub(super) fn cheapest_round(graph: &ElasticaGraph, mask: &DirectionMask, departures: &[Vec<State>]) -> f32 {
     let n = departures.len();
     let table: Vec<Vec<Vec<f32>>> = (0..n)

@@ -74,6 +74,7 @@ pub(super) fn research(name: &str) -> Option<TriMesh> {
     Some(Arc::unwrap_or_clone(research_mesh(name)?.mesh))
 }
 
+/// Whether each edge is inside the surface and has a dihedral angle above `degrees`.
 fn sharp_edges(mesh: &TriMesh, degrees: f64) -> Vec<bool> {
     let normal = |h| mesh.face_normal(mesh.face(h));
     mesh.edges()
@@ -94,7 +95,7 @@ pub(super) fn graph(mesh: TriMesh) -> ElasticaGraph {
     graph_with(mesh, &ElasticaOptions::default())
 }
 
-/// Some vertices, spread over the mesh.
+/// At most `count` vertices, spread over the mesh.
 pub(super) fn sample(graph: &ElasticaGraph, count: usize) -> impl Iterator<Item = VertexId> + use<> {
     let n = graph.mesh().n_vertices();
     (0..count.min(n)).map(move |i| VertexId::new((i * 7919 + 13) % n))

@@ -1,8 +1,8 @@
 //! Attachment of nodes to features.
 //!
-//! Arcs tie nodes to features: if a chain of arcs runs from a corner of a feature along it to a node, the node has the
-//! constant coordinate of the feature, and a map in which the feature is an isoline squeezes all triangles between
-//! both. Squeezed triangles therefore reveal such nodes; distance on the surface does not. They are moved onto the
+//! Where a chain of arcs runs from a corner of a feature along the feature to a node, the node has the constant
+//! coordinate of the feature, and a map in which the feature is an isoline squeezes all triangles between both. Such
+//! nodes are therefore found by squeezed triangles, whatever their distance on the surface. They are moved onto the
 //! feature, along edges and with their arcs, and stay on it from then on. Unconstrained regular nodes follow if their
 //! crossing lies on a feature.
 
@@ -21,11 +21,11 @@ use crate::progress::Progress;
 /// Largest ratio of the distance between a constrained node and its feature in the map to their distance on the
 /// surface, both in lengths of the feature edge, at which the node is attached. Chosen by hand.
 const SQUEEZED: f64 = 0.1;
-/// Largest distance in the map, in lengths of the feature edge, of the crossing of a regular node at which it is
-/// attached.
+/// Largest distance in the map, in lengths of the feature edge, between the feature and the crossing of an
+/// unconstrained regular node at which the node is attached.
 const NEAR: f64 = 0.1;
 /// Largest ratio of the distance of a node from a stepping line to the step, both in the map, at which the node is
-/// attached: equality with some tolerance.
+/// attached: 1 with some tolerance.
 const STEP_RATIO: f64 = 1.2;
 
 /// The foot of the perpendicular from a point to an edge, in the map.
@@ -33,7 +33,7 @@ struct Foot {
     halfedge: HalfedgeId,
     /// Its position on the edge's line, 0 at the origin of the half-edge and 1 at its target.
     along: f64,
-    /// Distance of the point from the line.
+    /// Distance of the point from the line through the edge.
     far: f64,
     /// Length of the edge.
     length: f64,
@@ -53,6 +53,7 @@ impl Foot {
         beyond.hypot(self.far)
     }
 
+    /// Whether it lies on the edge, not beyond an end.
     fn is_inside(&self) -> bool {
         (0.0..=1.0).contains(&self.along)
     }
@@ -103,6 +104,7 @@ impl Optimiser<'_> {
         self.move_to_targets(targets, progress)
     }
 
+    /// The feature lines that have relaxed edges with a step.
     fn stepping_lines(&self) -> Vec<SteppingLine> {
         let State { topology, solution, .. } = &self.state;
         let mut step = vec![0.0; topology.mesh.n_edges()];
@@ -223,7 +225,7 @@ impl Optimiser<'_> {
         (foot.is_inside() && foot.far < near * foot.length).then(|| foot.end(&self.state))
     }
 
-    /// Whether a vertex on a feature may have a node: it is no end or crossing of features, and no other node is there.
+    /// Whether a vertex on a feature may have a node: it is inside a feature line and the surface, and has no node yet.
     fn is_free(&self, v: VertexId) -> bool {
         let mesh = &self.state.topology.mesh;
         let rays = mesh.outgoing(v).filter(|&h| self.sharp[mesh.edge(h).index()]).count();

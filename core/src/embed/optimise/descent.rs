@@ -13,23 +13,25 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::FaceId;
 use crate::progress::Progress;
 
-/// Share of the energy that a step of the injective phase has to gain, and how many steps in a row may gain less before
-/// the descent ends. The energy is bounded below by that of the ideal map, so that the share is one of what matters,
-/// unlike in the least-squares phase. Chosen by hand.
+/// Relative decrease of the energy below which a step of the injective phase is idle. That energy has a positive lower
+/// bound, so a relative decrease is meaningful; the least-squares energy has none. Chosen by hand.
 const MIN_GAIN: f64 = 3e-3;
+/// Number of idle steps in a row after which the descent ends. Chosen by hand.
 const MAX_IDLE: usize = 2;
 /// Largest number of halvings of a step of the injective phase: measured, a step that fails at a quarter of its length
 /// fails at any length, for another reason.
 const INJECTIVE_HALVINGS: usize = 2;
-/// Number of steps after which the least-squares map is judged, and the largest number of flipped triangles it may then
-/// have. With more, the map as a whole contradicts its constraints; starting the injective phase from the initial
-/// embedding is faster then, and finds a map.
+/// Number of steps after which the flipped triangles of the least-squares map are counted; see [`MAX_FLIPPED`].
 const TRIAL_STEPS: usize = 4;
+/// Largest number of flipped triangles of a least-squares map that is used further. With more, the map as a whole
+/// contradicts its constraints; starting the injective phase from the initial embedding is faster then, and finds a
+/// map.
 pub(super) const MAX_FLIPPED: usize = 50;
 /// Cosine between successive steps of a node above which its step size grows, and below whose negative it is halved.
 const SAME_DIRECTION: f64 = 0.3;
-/// Growth of the step size of a node that keeps its direction, and the largest factor reached.
+/// Growth of the step size of a node that keeps its direction, per step.
 const GROWTH: f64 = 1.4;
+/// Upper bound of the factor of a node's step size.
 const MAX_FACTOR: f64 = 6.0;
 
 impl Optimiser<'_> {
@@ -77,7 +79,7 @@ impl Optimiser<'_> {
             self.failed = 0;
             self.adapt_step_sizes();
         } else {
-            self.step_factor.iter_mut().for_each(|p| *p *= 0.5);
+            self.step_factor.iter_mut().for_each(|factor| *factor *= 0.5);
             self.failed += 1;
         }
         Ok(better)
@@ -125,9 +127,9 @@ impl Optimiser<'_> {
         change.iter().map(|&c| c > 0.0).collect()
     }
 
-    /// The state with nodes moved, but for those that `stays` marks. While no injective map is found, nodes in whose
+    /// The state with all nodes moved except those that `stays` marks. While no injective map is found, nodes in whose
     /// cells triangles flip are marked as well; `None` once more than half of all are marked. `moved` makes the
-    /// topology, given the cells and the marks. Returned as well are the marks.
+    /// topology, given the cells and the marks. The marks are returned as well.
     pub(super) fn solve_moved(
         &mut self,
         moved: impl Fn(&Self, &[u32], &[bool]) -> EmbeddingTopology,
@@ -156,7 +158,7 @@ impl Optimiser<'_> {
     /// Marks the nodes in whose cells there are flipped triangles.
     pub(super) fn mark_nodes_near(&self, Flipped(list): &Flipped, cell: &[u32], stays: &mut [bool]) {
         for v in list.iter().flat_map(|&f| self.state.topology.mesh.face_vertices(f)) {
-            // Vertices that no node reaches have no cell.
+            // A vertex of a component without nodes has no cell.
             stays.get_mut(cell[v.index()] as usize).into_iter().for_each(|s| *s = true);
         }
     }

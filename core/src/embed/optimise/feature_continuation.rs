@@ -1,11 +1,11 @@
 //! Features become isolines: penalty continuation up to hard constraints.
 //!
 //! Constraining all features at once flips triangles; a penalty brings them only near isolines. So the penalty weight
-//! is raised step by step, each map starting from the one before, which is injective and stays so. What cannot follow
-//! becomes visible: between a feature and a node that belongs on it triangles are squeezed, and the node is moved there
-//! ([`attachment`](super::attachment)); edges that keep slanting against their isoline contradict the layout and are
-//! relaxed to the unit penalty. The other edges then lie on isolines up to rounding, and hard constraints do not change
-//! the map.
+//! is raised step by step. Each map starts from the one before, which is injective, and stays injective. Two obstacles
+//! show in these maps. Triangles are squeezed between a feature and a node that belongs on it: the node is moved there
+//! ([`attachment`](super::attachment)). Edges keep slanting against their isoline where they contradict the layout:
+//! they are relaxed to the unit penalty. The other edges then lie on isolines up to rounding, and hard constraints do
+//! not change the map.
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::optimise::optimiser::Optimiser;
@@ -29,7 +29,7 @@ const ATTACHMENT_ROUNDS: usize = 3;
 /// the constant coordinate over the length in the map, 0 to 1) that is not relaxed. Slopes of edges that can follow
 /// fall with the weight. Chosen by hand.
 const LAST_WEIGHTS: [(f64, f64); 3] = [(1e3, 0.2), (1e4, 0.1), (1e6, 0.02)];
-/// Largest number of Newton steps for each weight.
+/// Largest number of Newton steps for each penalty weight.
 const NEWTON_STEPS: usize = 15;
 /// Share of the length of a feature line, 0 to 1, above which relaxed edges relax the whole line: constraining the
 /// pieces that remain costs distortion, and they do not make a line.
@@ -84,7 +84,7 @@ impl Optimiser<'_> {
         self.solve_relaxing_features(progress)
     }
 
-    /// The second part of the continuation; returns the number of relaxed edges.
+    /// The second part of the continuation, with [`LAST_WEIGHTS`]; returns the number of relaxed edges.
     fn raise_penalty(&mut self, progress: &Progress) -> Result<usize, EmbeddingError> {
         for (weight, slope) in LAST_WEIGHTS {
             self.converge_with_penalty(weight, progress)?;

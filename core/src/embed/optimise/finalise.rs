@@ -10,10 +10,12 @@ use crate::embed::parameterise::stiffen::stiffening;
 use crate::param::{Effort, FlippedTriangle};
 use crate::progress::Progress;
 
-/// Rounds of stiffening, and the growth of the weights of flipped triangles in each; see [`stiffen`]. Chosen by hand.
+/// Largest number of rounds of stiffening. Chosen by hand.
 const STIFFENING_ROUNDS: usize = 15;
+/// Growth of the weights of flipped triangles in each round; see [`stiffening`]. Chosen by hand.
 const STIFFENING_GROWTH: f64 = 1.5;
-/// Largest number of steps of regular nodes to their crossings in the least-squares map. Every one is a Newton step.
+/// Largest number of steps of regular nodes to their crossings in the least-squares map. Each is a Newton step, so that
+/// few suffice.
 const CROSSING_STEPS: usize = 3;
 /// Relative change of the energy below which regular nodes have reached their crossings. Chosen by hand.
 const CROSSINGS_REACHED: f64 = 3e-3;

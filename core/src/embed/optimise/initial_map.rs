@@ -23,15 +23,15 @@ use crate::param::DistortionWeights;
 use crate::progress::Progress;
 use crate::surface::PrincipalCurvature;
 
-/// Weight λ of the size term of the energy: large enough to keep limbs and the patches of one chord from shrinking to
-/// nothing, small enough not to distort angles. Measured with 0.06, 0.03 and 0.02: the conformal distortion of botijo
-/// (99 patches) is 2.064, 2.056 and 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with a strength of principal
-/// directions of 3.4.
+/// Weight λ of the size term of the energy: large enough to keep protrusions and the patches of one chord from
+/// shrinking to nothing, small enough not to distort angles. Measured with 0.06, 0.03 and 0.02: the conformal
+/// distortion of botijo (99 patches) is 2.064, 2.056 and 2.053, that of elephant_12k 2.130, 2.128 and 2.120, with a
+/// strength of principal directions of 3.4.
 const SIZE_WEIGHT: f64 = 0.02;
-/// The same for surfaces whose shape is given by features, whose constraints squeeze the triangles between them: with
-/// less, some features of the fan disk cannot be constrained.
+/// The weight λ on surfaces dominated by features, whose constraints squeeze the triangles between them: with less,
+/// some features of the fan disk cannot be constrained.
 const SIZE_WEIGHT_FEATURES: f64 = 0.06;
-/// Largest number of Newton steps of the first map; it has converged long before.
+/// Largest number of Newton steps of the first map, which converges in fewer.
 const FIRST_NEWTON_STEPS: usize = 60;
 
 impl<'a> Optimiser<'a> {
@@ -96,7 +96,7 @@ impl<'a> Optimiser<'a> {
     }
 }
 
-/// An initial embedding with its patch maps, put together to a mesh and a seamless map of the surface.
+/// An initial embedding with its patch maps, joined to one mesh and one seamless map of the surface.
 struct MappedEmbedding {
     /// The surface with all arcs as edge paths.
     mesh: TriMesh,

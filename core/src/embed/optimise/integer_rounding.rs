@@ -12,10 +12,11 @@ use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::chord_lengths::{FixedLength, chord_lengths};
 use crate::progress::Progress;
 
-/// Share of the open chords that is rounded before the map is solved for again, 0 to 1. Chosen by hand; with less there
-/// are more solves.
+/// Share of the open chords that is rounded before the map is solved for again, 0 to 1; a smaller share takes more
+/// solves. Chosen by hand.
 const ROUNDED_SHARE: f64 = 0.25;
-/// Factor of the least length below which rounding of numbers cannot push a multiple of `q` that equals it.
+/// Factor of the least length where multiples of `q` are compared with it: a multiple that equals the least length is
+/// allowed despite rounding errors.
 const TOLERANCE: f64 = 0.999;
 
 impl Optimiser<'_> {

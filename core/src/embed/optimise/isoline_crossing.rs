@@ -31,12 +31,12 @@ pub(super) fn step_to_crossing(
     half_arcs: &[HalfArc],
 ) -> Option<(HalfedgeId, DVec2)> {
     let (corner, crossing) = crossing(topology, through_arcs, map, half_arcs)?;
-    let off = crossing - at(map, corner);
+    let offset = crossing - at(map, corner);
     let [u, v] = map.gradients(metric, topology.mesh.face(corner));
     let area = u.perp_dot(v);
     // A flipped or flat map cannot be inverted.
     (area > FLAT * 0.5 * (u.length_squared() + v.length_squared()))
-        .then(|| (corner, (off.y * u.perp() - off.x * v.perp()) / area))
+        .then(|| (corner, (offset.y * u.perp() - offset.x * v.perp()) / area))
 }
 
 /// The coordinates of the crossing of the isolines of a regular node, in the chart of the triangle of the returned

@@ -1,7 +1,8 @@
 //! Optimisation of node positions and features, in two phases: with a least-squares map, and with an injective map.
 //!
-//! The room may use `topology` and `parameterise`. [`optimiser`] holds the state; the other files are its operations:
-//! [`descent`] and [`node_steps`] move nodes, [`initial_map`] starts the injective phase, [`finalise`] ends a phase.
+//! The module may use `topology` and `parameterise`. [`optimiser`] holds the state; the other files are operations on
+//! it: [`descent`] and [`node_steps`] move nodes, [`initial_map`] starts the injective phase, [`finalise`] ends a
+//! phase.
 
 pub(super) mod attachment;
 pub(super) mod descent;

@@ -36,10 +36,10 @@ impl Optimiser<'_> {
         let State { topology, metric, field, objective, anisotropy_share, solution } = &self.state;
         let (mesh, angle, uv) = (&topology.mesh, &field.angle, &solution.map.uv);
         match self.distortion {
-            // With weights of 1 and ρ instead of 1 and 1 the energy is steeper by their mean, but its minimum is no
-            // farther.
+            // With weights of 1 and ρ instead of 1 and 1 the gradient is larger by their mean, but the minimum is no
+            // farther away.
             None => descent(mesh, metric, angle, uv, objective, v) / (0.5 * (1.0 + self.settings.anisotropy)),
-            // Around its minimum the energy of injective maps rises half as fast.
+            // Around its minimum the energy of injective maps has half the second derivative.
             Some(distortion) => {
                 injective_descent(mesh, metric, angle, uv, (objective, distortion, anisotropy_share), v)
                     / (0.25 * (1.0 + distortion.anisotropy))
@@ -47,7 +47,7 @@ impl Optimiser<'_> {
         }
     }
 
-    /// The topology with all nodes moved by one step, but for those that `stays` marks.
+    /// The topology with all nodes moved by one step except those that `stays` marks.
     pub(super) fn moved(&self, cell: &[u32], stays: &[bool]) -> EmbeddingTopology {
         let State { topology, metric, .. } = &self.state;
         let mut moved = topology.clone();
@@ -111,7 +111,7 @@ impl Optimiser<'_> {
         metric.tangent(mesh, mesh.face(h), metric.direction(h) + turn) * step.length()
     }
 
-    /// The topology with unconstrained regular nodes, and only these, moved to the crossings of their isolines, but for
+    /// The topology with unconstrained regular nodes, and only these, moved to the crossings of their isolines, except
     /// those that `stays` marks.
     pub(super) fn with_regular_nodes_moved(&self, cell: &[u32], stays: &[bool]) -> EmbeddingTopology {
         let mut moved = self.state.topology.clone();

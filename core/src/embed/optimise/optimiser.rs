@@ -1,7 +1,7 @@
 //! The state of an optimisation: topology, field and map, and the solves for them (Campen, sections 6.3 to 6.5).
 //!
 //! An optimiser works in one of two phases. In the least-squares phase maps may flip triangles; in the injective phase,
-//! with [`DistortionWeights`], every state is an injective map. The other files of the room are its operations:
+//! with [`DistortionWeights`], every state is an injective map. The other files of the module are operations on it:
 //! [`descent`](super::descent) moves the nodes, [`finalise`](super::finalise) ends the phase.
 
 use glam::{DVec2, DVec3};
@@ -24,7 +24,7 @@ use crate::surface::{Metric, PrincipalCurvature};
 /// Newton steps of an injective map after the nodes have moved. The first ones correct the guess; more would be spent
 /// on a map that the next node step changes again.
 const NEWTON_STEPS: usize = 4;
-/// Rings of triangles around a vertex that a node has left or come to in which the field turns markedly.
+/// Number of rings of triangles around a vertex, from or to which a node has moved, in which the field turns markedly.
 const TURNING_RINGS: usize = 2;
 
 /// An embedding under optimisation.
@@ -58,7 +58,7 @@ pub struct Optimiser<'a> {
     pub(super) last_direction: Vec<DVec3>,
     /// Failed node steps since the last successful one.
     pub(super) failed: usize,
-    /// Successive node steps that lowered the energy by next to nothing.
+    /// Successive node steps that lowered the energy too little; see [`super::descent`].
     pub(super) idle: usize,
     /// Node steps of this phase.
     pub(super) steps: usize,
@@ -141,7 +141,7 @@ impl<'a> Optimiser<'a> {
         self.through_arcs = ThroughArcs::new(problem.layout, |i| pinned[i]);
     }
 
-    /// The best state so far.
+    /// The present state. A node step that does not lower the energy leaves it unchanged.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -169,12 +169,12 @@ impl<'a> Optimiser<'a> {
         self.restart();
     }
 
-    /// For each node whether it cannot move.
+    /// For each node whether it cannot move: pinned nodes, and those at corners of features or of the boundary.
     pub fn fixed_nodes(&self) -> Vec<bool> {
         self.projection.node_constraint.iter().map(|&c| c == NodeConstraint::Fixed).collect()
     }
 
-    /// The chords that are shorter than `least` in the map, or fixed at the least length, with their lengths.
+    /// The chords that are shorter than `least` in the map, or fixed at a length, each with its length in the map.
     pub fn short_chords(&self, least: f64) -> Vec<(u32, f64)> {
         let (topology, map) = (&self.state.topology, &self.state.solution.map);
         let fixed = &self.chord_lengths.fixed;

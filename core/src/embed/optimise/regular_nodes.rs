@@ -27,8 +27,8 @@ const ON_SIDE: f64 = 1e-6;
 const ATTEMPTS: usize = 6;
 
 impl Optimiser<'_> {
-    /// Places regular nodes at the crossings of their isolines. Nodes around which triangles would flip stay off their
-    /// crossings; if no attempt succeeds, all nodes stay.
+    /// Places regular nodes at the crossings of their isolines. Nodes around which triangles would flip keep their
+    /// positions; if no attempt succeeds, all nodes do.
     ///
     /// # Errors
     ///
@@ -60,8 +60,8 @@ impl Optimiser<'_> {
         Ok(())
     }
 
-    /// The topology with regular nodes at their crossings, but for those that `stays` marks; and the nodes that came
-    /// onto features.
+    /// The topology with regular nodes at their crossings, except those that `stays` marks; and the nodes that now lie
+    /// on features.
     fn with_nodes_at_crossings(&self, stays: &[bool]) -> (EmbeddingTopology, Vec<usize>) {
         let mut topology = self.state.topology.clone();
         let mut on_feature = Vec::new();

@@ -33,7 +33,7 @@ pub enum NodeConstraint {
     Fixed,
 }
 
-/// The surface with what restricts the positions of nodes on it.
+/// Projection of node positions onto the surface, and the constraints on them.
 pub(super) struct SurfaceProjection<'a> {
     /// The mesh of the problem.
     pub surface: &'a TriMesh,
@@ -47,7 +47,7 @@ pub(super) struct SurfaceProjection<'a> {
     pub on_curve: Vec<bool>,
     /// The freedom of each node.
     pub node_constraint: Vec<NodeConstraint>,
-    /// Least distance between irregular nodes.
+    /// Least distance in space between irregular nodes, in units of the mesh.
     pub min_distance: f64,
 }
 
@@ -118,8 +118,8 @@ impl SurfaceProjection<'_> {
         let from = topology.nodes[node].vertex;
         let taken: Vec<VertexId> = topology.nodes.iter().map(|n| n.vertex).filter(|&v| v != from).collect();
         let mut corners: Vec<VertexId> = topology.mesh.face_vertices(face).to_vec();
-        // Nodes must not share triangles: one with nodes at two corners is nearly determined in the map, one with three
-        // entirely.
+        // Nodes must not share triangles: constraints nearly determine a triangle with nodes at two corners in the map,
+        // and one with three entirely.
         let beside = |v: VertexId| topology.mesh.outgoing(v).any(|h| taken.contains(&topology.mesh.target(h)));
         corners.retain(|&v| v == from || !(taken.contains(&v) || self.on_curve[v.index()] || beside(v)));
         self.sort_by_rest_distance(&mut corners, position);

@@ -1,5 +1,4 @@
-//! What an optimisation derives from the surface of the problem: topology, sharp edges and curvature of the working
-//! mesh, and the freedom of its nodes.
+//! Setup of an optimisation: topology, sharp edges and curvature of the working mesh, and the freedom of its nodes.
 
 use std::collections::BTreeSet;
 
@@ -13,8 +12,8 @@ use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{TriMesh, VertexId};
 use crate::surface::PrincipalCurvature;
 
-/// Least distance of irregular nodes on the surface, in least lengths of arcs: closer ones circle each other and wind
-/// up their arcs.
+/// Least distance of irregular nodes on the surface, in least arc lengths. Closer ones circle each other and wind up
+/// their arcs. Chosen by hand.
 const MIN_NODE_DISTANCE: f64 = 1.5;
 /// Cosine between successive curve edges below which a curve has a corner: half way from straight to a right angle.
 const CORNER_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -66,7 +65,8 @@ impl PreparedTopology {
     }
 }
 
-/// The sharp edges of the working mesh: those of the surface, and their halves where a node was inserted.
+/// Whether each edge of the working mesh is sharp: sharp edges of the surface, and their halves where a node was
+/// inserted.
 fn sharp_edges(surface: &Surface<'_>, topology: &EmbeddingTopology) -> Vec<bool> {
     let n = surface.mesh.n_vertices();
     let pair = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
@@ -86,6 +86,7 @@ fn sharp_edges(surface: &Surface<'_>, topology: &EmbeddingTopology) -> Vec<bool>
                 return sharp.contains(&pair(a, b));
             }
             // A half of a sharp edge: the inserted vertex lies on the edge, between its two ends.
+            // The test for that is collinearity up to rounding errors.
             let (new, old) = if a.index() >= n { (a, b) } else { (b, a) };
             let p = topology.mesh.position(new);
             let q = topology.mesh.position(old);

@@ -1,9 +1,9 @@
 //! The constraints of the map: arcs, boundary and feature edges are isolines (Campen, sections 6.4.1 and 6.5.2).
 //!
-//! An arc is constrained at its two end nodes only (equation 6.3); between them it may take any way. Boundary and
-//! features are constrained edge by edge. The topology tells which coordinate is constant along an arc and along the
-//! boundary; the direction of the field tells it along a feature. A feature at a slant to the field contradicts the
-//! layout; constrained nevertheless it would flip triangles, so it is left out.
+//! An arc is constrained at its two end nodes only (equation 6.3); between them it may take any path. Boundary and
+//! features are constrained edge by edge. The topology gives the coordinate that is constant along an arc and along the
+//! boundary; the direction of the field gives it along a feature. A feature at a slant to the field contradicts the
+//! layout and would flip triangles, so it is left out.
 
 use crate::embed::parameterise::feature_axes::{self, DirectedEdge, heading_in};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
@@ -52,10 +52,11 @@ fn constant_axis(heading: i32) -> u8 {
     if heading % 2 == 0 { 1 } else { 0 }
 }
 
-/// Limit, in quarter turns, to the deviation of the field from feature edges of the least-squares map, which
-/// contradicting constraints flip: half the deviation at which the direction would be ambiguous.
+/// Limit of the deviation of the field from feature edges constrained in the least-squares map, in quarter turns: half
+/// the deviation at which the direction would be ambiguous. Constraints that contradict the layout flip triangles
+/// there.
 pub(super) const SLANT_LIMIT: f64 = 0.25;
-/// The limit of the injective map: none, since no deviation exceeds it. The whole feature line decides.
+/// The limit for injective maps, in quarter turns: above every deviation. The direction is decided for the whole line.
 pub(in crate::embed) const NO_SLANT_LIMIT: f64 = 4.0;
 
 /// The feature edges that can be isolines in a field of the given angles, sorted by increasing deviation from the

@@ -19,13 +19,14 @@ use crate::param::{
 use crate::progress::Progress;
 use crate::surface::Metric;
 
-/// Largest number of flipped triangles of a guess that are worth removing. After a node step there is the alternative
-/// of a shorter step; for a first map there is only a much worse start, so more effort pays.
+/// Largest number of flipped triangles of a guess that are removed after a node step: the alternative is a shorter
+/// step.
 const FEW_AFTER_STEP: usize = 50;
+/// The same for a first map, where the alternative is a much worse start and more effort pays.
 const FEW_AT_FIRST: usize = 2000;
-/// Rounds of fitting a guess again with more weight on its flipped triangles, and the growth of their weights in each;
-/// see [`stiffen`]. Both chosen by hand.
+/// Largest number of times that a guess is fitted again with more weight on its flipped triangles. Chosen by hand.
 const REFITS: usize = 2;
+/// Growth of the weights of flipped triangles in each fit; see [`stiffening`]. Chosen by hand.
 const REFIT_GROWTH: f64 = 9.0;
 
 /// Where the descent of an injective map starts.

@@ -1,7 +1,7 @@
 //! Cross field and seamless map for nodes at given vertices: the solves, their constraints, quality measures, and the
 //! gradient of the energy at the nodes.
 //!
-//! The room may use `topology`; it does not move nodes. [`solve`] is the entry.
+//! The module may use `topology`; it does not move nodes. [`solve`] is the entry.
 
 pub(super) mod chord_lengths;
 pub(super) mod constraints;

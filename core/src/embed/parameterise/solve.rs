@@ -25,9 +25,10 @@ use crate::solve::{SolveError, SpdSymbolic};
 use crate::surface::{Metric, PrincipalCurvature};
 
 /// Deviation of the field from a principal direction, in quarter turns, up to which the direction has its full penalty
-/// weight, and from which on none: 14° and 32°. Beyond an eighth of a turn another direction of the cross would be
-/// meant.
+/// weight: 14°.
 const FULL_AGREEMENT: f64 = 0.15;
+/// Deviation from which on it has none: 32°. Beyond an eighth of a turn it would agree with another direction of the
+/// cross.
 const NO_AGREEMENT: f64 = 0.35;
 /// Penalty weight of the directions of the initial embedding per area, in inverse squared lengths on a surface of
 /// bounding-box diagonal 1. They decide how the field as a whole is turned where nothing else does, and are too weak to
@@ -35,7 +36,7 @@ const NO_AGREEMENT: f64 = 0.35;
 const INITIAL_DIRECTIONS: f64 = 0.5;
 /// Rounds of solving for the first field: in each one more principal directions agree with it.
 const FIRST_FIELD_ROUNDS: usize = 4;
-/// Largest share of the anisotropy in a triangle: angles suffer where it is more.
+/// Largest share of the anisotropy in a triangle: with a larger one angles are distorted.
 const MAX_ANISOTROPY_SHARE: f64 = 4.0;
 
 /// Which map is solved for.
@@ -209,8 +210,8 @@ impl Solver<'_> {
         }
     }
 
-    /// The angles of the guiding field. Which principal directions agree with it is not known before the first field,
-    /// so that this is solved for in several rounds.
+    /// The angles of the guiding field. Which principal directions agree with it is only known once there is a field,
+    /// so that the first one is solved for in several rounds.
     fn field_angles(
         &self,
         (topology, metric): (&EmbeddingTopology, &Metric),

@@ -1,4 +1,4 @@
-//! Field and map for nodes at given vertices, and what can be read from them.
+//! Field and map for nodes at given vertices, with their flipped triangles, energies and feature edges.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -39,8 +39,8 @@ pub struct FeatureEdges {
     pub off_isolines: Vec<[[f64; 3]; 2]>,
 }
 
-/// Ratio of an image's area to its target area at and below which the triangle counts as flipped: so thin it is flat
-/// but for rounding. Chosen by hand.
+/// Ratio of an image's area to its target area at and below which the triangle counts as flipped: degenerate up to
+/// rounding errors. Chosen by hand.
 const FLAT: f64 = 1e-3;
 /// Coordinates that differ by no more count as equal: rounding on a surface of bounding-box diagonal 1.
 const EQUAL: f64 = 1e-9;

@@ -41,7 +41,7 @@ impl<'a> ChordCollapse<'a> {
         short.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         let before = self.collapsed.len();
         let mut irregularity = self.remaining_layout().map_or(usize::MAX, |c| c.layout.irregularity());
-        // Nodes merged in this call.
+        // Whether each node was merged in this call.
         let mut touched = vec![false; self.layout.nodes.len()];
         for (chord, length) in short {
             if self.collapsed.len() == before + most {

@@ -2,7 +2,7 @@
 //!
 //! Optimal node positions depend little on triangles much smaller than patches, but the cost of every step is
 //! proportional to the number of triangles. So the layout is transferred to a proxy, optimised there, and transferred
-//! back. On the mesh itself remain a first map, constraining features and nodes, and a few node steps.
+//! back. On the mesh itself there remain a first map, a few node steps, and the constraints of features and nodes.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -22,23 +22,27 @@ use crate::progress::Progress;
 use crate::proxy::Proxy;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, nearest_in_triangle};
 
-/// Number of triangles of the proxy: so many in all, or for each patch where that is more. Chosen by hand.
+/// Least number of triangles of the proxy. Chosen by hand.
 const PROXY_FACES: usize = 6000;
+/// Least number of triangles of the proxy for each patch of the layout. Chosen by hand.
 const PROXY_FACES_PER_PATCH: usize = 60;
-/// Least ratio of the number of triangles of the mesh to that of the proxy; below it the detour costs more than it
+/// Least ratio of the number of triangles of the mesh to that of the proxy; below it the proxy takes more time than it
 /// saves.
 const MIN_REDUCTION: usize = 2;
 /// Factor by which the proxy is refined if the layout does not fit on it.
 const PROXY_REFINEMENT: usize = 2;
-/// Fractions of the whole optimisation, begin and end: making the proxy, optimising on it, and optimising on the mesh.
-/// The first half of the last one is skipped, so that its range begins below the end of the second.
+/// Range of the reported progress while the proxy is made: fractions of the whole optimisation, 0 to 1.
 const SIMPLIFYING: [f64; 2] = [0.0, 0.05];
+/// The same while the embedding is optimised on the proxy.
 const ON_PROXY: [f64; 2] = [0.05, 0.6];
+/// The same on the mesh itself. Only the second half of these phases is run, so that the range begins below the end of
+/// the one before.
 const ON_MESH: [f64; 2] = [0.2, 1.0];
 /// Largest number of Newton steps of the first map on the mesh. It starts near its minimum, and later solves improve
 /// it.
 const FIRST_NEWTON_STEPS: usize = 8;
-/// Penalty weight of features in that map: they lie near isolines already, so that the continuation begins late.
+/// Penalty weight of features in that map, in multiples of the unit penalty: features lie near isolines already, so
+/// that the continuation begins with a large weight.
 const FEATURE_PENALTY: f64 = 1e3;
 /// Node steps on the mesh without features. With features there are none: measured, under this penalty no step lowered
 /// the energy.

@@ -1,4 +1,4 @@
-//! From the final map to arcs, patches and measures (Campen, section 6.4.2).
+//! Extraction of arcs, patches and quality measures from the final map (Campen, section 6.4.2).
 
 use crate::embed::error::EmbeddingError;
 use crate::embed::parameterise::quality::measure_patches;
@@ -18,7 +18,8 @@ use crate::surface::face_curvature;
 const MAX_ISOLINE_LENGTH: f64 = 100.0;
 
 /// The embedding that a final state defines: traced arcs, or the completed layout where arcs are missing, and the
-/// rectangles of its patches. The report lacks what happened before.
+/// rectangles of its patches. The report holds only what the final state determines; steps, energy and flips before it
+/// are zero.
 pub(super) fn extract_embedding(
     problem: &Problem<'_>,
     (state, sharp): (&State, &[bool]),

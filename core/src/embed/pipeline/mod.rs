@@ -1,7 +1,7 @@
 //! An optimisation from the initial embedding to the result: its phases, by way of a smaller mesh where the mesh is
 //! large, with short chords collapsed where that is asked for; and the prediction of how well a layout will fit.
 //!
-//! [`coarse_to_fine`] is the entry. The room may use all other rooms of `embed`.
+//! [`coarse_to_fine`] is the entry. The module may use all other modules of `embed`.
 
 pub(super) mod chord_collapse;
 pub(super) mod coarse_to_fine;

@@ -14,8 +14,8 @@ use crate::progress::Progress;
 
 /// Fractions of the whole optimisation at which the least-squares descent is reported to begin and end, 0 to 1.
 const DESCENT_FRACTIONS: (f64, f64) = (0.05, 0.35);
-/// Largest factor by which the energy may grow when chords below the asked length are collapsed: collapsing at any
-/// price can spoil a map. Chosen by hand.
+/// Largest factor by which the energy may grow when chords below the asked length are collapsed: without a bound a
+/// collapse could distort the whole map. Chosen by hand.
 const ENERGY_GROWTH: f64 = 1.5;
 
 /// Which chords are collapsed.

@@ -13,19 +13,21 @@ use crate::embed::pipeline::report::{EmbeddingReport, Next, OptimisedEmbedding, 
 use crate::embed::problem::Problem;
 use crate::progress::Progress;
 
-/// What is shown every improvement, and may ask to finish.
+/// The callback that is shown every improvement; its answer may end the optimisation.
 pub(super) type Observer<'w> = &'w mut dyn FnMut(&Snapshot) -> Next;
 
-/// An optimisation on its way through the phases.
+/// A running optimisation, across its phases.
 pub(super) struct Phases<'w> {
     observer: Observer<'w>,
     /// The last answer of the observer.
     pub next: Next,
     /// Node steps of all phases.
     steps: usize,
+    /// Area of the surface.
     area: f64,
-    /// Energy over area, and flipped triangles, of the first map.
+    /// Energy of the first map over the area of the surface; NaN without one.
     energy_before: f64,
+    /// Number of flipped triangles of the first map.
     flipped_before: usize,
     /// The energy at the start of the present phase; `None` before its first state is shown.
     phase_energy: Option<f64>,
@@ -67,7 +69,7 @@ impl<'w> Phases<'w> {
         self.next = (self.observer)(&Snapshot::new(state, self.steps, phase_energy));
     }
 
-    /// Moves the nodes until the descent has ended. Progress is reported as going from `from` to `to`.
+    /// Moves the nodes until the descent has ended. Progress is reported from the fraction `from` to the fraction `to`.
     pub(super) fn move_nodes(
         &mut self,
         optimiser: &mut Optimiser<'_>,
@@ -142,7 +144,7 @@ impl<'w> Phases<'w> {
         finalise(problem, optimiser, progress)
     }
 
-    /// The result of the injective phase from the initial embedding; if it fails, `found` from before.
+    /// The result of the injective phase from the initial embedding; if it fails, the earlier result `found`.
     pub(super) fn from_initial_embedding(
         &mut self,
         problem: &Problem<'_>,

@@ -1,10 +1,10 @@
-//! A problem whose layout has lost chords.
+//! The problem with the layout that remains after chords were collapsed.
 
 use crate::embed::problem::Problem;
 use crate::embed::topology::embedding_topology::{ArcHeadings, arc_headings};
 use crate::layout::Reembedded;
 
-/// What replaces the layout of a problem, and what belongs to it, after chords were collapsed.
+/// The layout of a problem after chords were collapsed, with its initial embedding, headings and pins.
 pub(super) struct ReducedProblem {
     /// The remaining layout with its initial embedding; `None` if no chord is collapsed.
     pub reembedded: Option<Reembedded>,

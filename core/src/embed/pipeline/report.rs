@@ -1,4 +1,4 @@
-//! What an optimisation shows while it runs, and what it returns.
+//! Snapshots of a running optimisation, and its result.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -88,7 +88,7 @@ pub struct CollapsedChord {
 pub struct UncollapsedChord {
     /// Its index in the layout of the problem.
     pub chord: u32,
-    /// The length of its arcs.
+    /// The length of its arcs in the map.
     pub length: f64,
     /// Why it could not be collapsed.
     pub reason: String,
@@ -101,7 +101,7 @@ pub struct EmbeddingReport {
     pub steps: usize,
     /// Least-squares energy of the map over the area of the surface, with the nodes at their initial positions.
     pub energy_before: f64,
-    /// The same of the final map.
+    /// The same for the final map and node positions.
     pub energy_after: f64,
     /// Number of flipped triangles of the first map.
     pub flipped_before: usize,

@@ -7,7 +7,7 @@
 //!
 //! The jumps fix the topology of the field completely (Campen, section 6.3.1): its turning number around a node of
 //! valence `k` is `−k/4`, and each arc keeps its direction. The turning numbers along generators and boundaries are
-//! sums of these jumps, so that they need not be computed one by one and zipped together.
+//! sums of these jumps, so that the zipping of the thesis is not needed.
 
 use std::collections::HashMap;
 

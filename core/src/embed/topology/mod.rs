@@ -2,7 +2,7 @@
 //!
 //! The working mesh has a vertex for every node. Arcs are chains of triangles; period jumps tie the directions of cross
 //! fields to the layout. Nodes move from vertex to vertex with their arcs, and the mesh is refined around irregular
-//! ones. The room may use `mesh`, `surface`, `solve`, `dual` and `layout`; it knows no map.
+//! ones. The module may use `mesh`, `surface`, `solve`, `dual` and `layout`; it does not know maps.
 
 pub(in crate::embed) mod corner_nodes;
 pub(in crate::embed) mod embedding_topology;

@@ -1,9 +1,9 @@
 //! The working mesh of an embedding: the triangles of the surface, with a vertex for every node.
 //!
 //! A node at a vertex of the surface stays there. Any other node is inserted: its triangle is split in three, or each
-//! triangle beside its edge in two. The initial embedding lives on a refinement of the same surface, in which arcs are
-//! edge paths. The new edges are inserted into that refined mesh too, so that each of its faces lies in one working
-//! triangle.
+//! triangle beside its edge in two. The mesh of the initial embedding is a refinement of the same surface, in which
+//! arcs are edge paths. The new edges are inserted into that refined mesh too, so that each of its faces lies in one
+//! working triangle.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ use crate::embed::EmbeddingError;
 use crate::layout::Embedding;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
-/// The mesh that a layout is optimised on, and the initial embedding of the layout in terms of it.
+/// The mesh that a layout is optimised on, with the refined mesh and the arcs of its initial embedding.
 pub(super) struct WorkingMesh {
     /// The surface with a vertex for every node. The vertices of the surface come first; triangle `f` of the surface,
     /// or a part of it, is triangle `f`.
@@ -212,7 +212,7 @@ impl Inserter<'_> {
     /// Gives the part of triangle `f` at its side from `a` to `b` (vertices of the refined mesh) the tag `id`.
     fn tag_part(&mut self, f: u32, id: u32, a: u32, b: u32) -> Option<()> {
         let inside = |m: &RefinedMesh, h: u32| m.tag[h as usize / 3] == f;
-        // The first half-edge on the side: it leaves `a`, and on its right `f` ends.
+        // The first half-edge on the side: it leaves `a`, and the face on its right is not in `f`.
         let seed = self.refined.outgoing(a).into_iter().find(|&h| {
             let outside = self.refined.twin(h).is_none_or(|t| !inside(self.refined, t));
             inside(self.refined, h) && outside && self.side_ends_at(h, b, f)

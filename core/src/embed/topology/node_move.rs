@@ -82,12 +82,12 @@ impl EmbeddingTopology {
             if !arc.crossed.iter().any(|&g| g == h || g == twin) {
                 continue;
             }
-            let lead = |&g: &HalfedgeId| match g {
+            let detour = |&g: &HalfedgeId| match g {
                 g if g == h => around.clone(),
                 g if g == twin => back.clone(),
                 g => vec![g],
             };
-            arc.crossed = arc.crossed.iter().flat_map(lead).collect();
+            arc.crossed = arc.crossed.iter().flat_map(detour).collect();
             cancel_backtracking(mesh, &mut arc.crossed);
         }
     }
@@ -121,7 +121,7 @@ fn prepend_fan(mesh: &TriMesh, jump: &[i32], arc: &mut TopologyArc, fan: &Fan) {
     arc.heading = (i32::from(arc.heading) + turns).rem_euclid(4) as u8;
 }
 
-/// Removes pairs of crossings of which the second takes back the first.
+/// Removes pairs of consecutive crossings of an edge and back.
 fn cancel_backtracking(mesh: &TriMesh, crossed: &mut Vec<HalfedgeId>) {
     let mut kept: Vec<HalfedgeId> = Vec::with_capacity(crossed.len());
     for &h in crossed.iter() {

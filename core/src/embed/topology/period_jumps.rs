@@ -18,8 +18,8 @@ use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::solve::{SparseHermitian, SpdFactor, c64};
 use crate::surface::Metric;
 
-/// Penalty weight of an arc's direction in a triangle that the arc passes through, beside edge weights of about 2: the
-/// field follows the arcs, but may cut their corners.
+/// Penalty weight of an arc's direction in a triangle that the arc passes through, where edge weights are about 2: the
+/// field follows the arcs, but may deviate at their corners.
 const ARC_PENALTY: f64 = 10.0;
 /// Diagonal term that keeps the system positive definite on a component without arcs; far below the edge weights.
 const REGULARISATION: f64 = 1e-7;
@@ -34,7 +34,7 @@ pub(super) struct DirectionHint {
     pub face: FaceId,
     /// The direction in space; its length is its weight among the hints of the triangle.
     pub vector: DVec3,
-    /// Which direction of the cross it is; modulo 4.
+    /// The direction of the cross that it is; modulo 4.
     pub direction: i32,
 }
 

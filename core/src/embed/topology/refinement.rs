@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn link_edges_are_split_until_an_irregular_node_has_enough_triangles() {
         let mut topology = sample_topology();
-        // More than six triangles can have without one that is flipped.
+        // Six triangles cannot span this angle without a flip.
         topology.nodes[1].valence = 12;
         let mark = vec![(); topology.mesh.n_vertices()];
         let mut fine = topology.clone();

@@ -4,15 +4,15 @@
 //! opposite pairs, so that only chains from one irregular node to another must be isolines; the position of a regular
 //! node follows as the crossing of its two chains. A chain that closes on itself must be a closed isoline.
 //!
-//! The position of a node on the chain may come out in another order than in the layout: the structure has to be
-//! verified afterwards.
+//! The crossings may lie along a chain in another order than the nodes in the layout: the structure has to be verified
+//! afterwards.
 
 use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc};
 use crate::layout::QuadLayout;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::surface::SurfacePoint;
 
-/// A half-arc: an arc, and whether the half-arc starts at its second node rather than at its first.
+/// A half-arc, the counterpart of a half-edge: an arc in one of its directions; `true` if it starts at the second node.
 pub(in crate::embed) type HalfArc = (u32, bool);
 
 /// The half-arcs around each node, and which of them are joined through regular nodes.

@@ -16,8 +16,8 @@ use crate::layout::QuadLayout;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;
 
-/// How far the isoline of an arc may end from where it should to be shown in a preview, relative to the arc's length.
-///
+/// Largest difference, relative to the arc's length, between the length of an isoline and that of its arc's chain at
+/// which the isoline is shown in a preview.
 const PREVIEW_TOLERANCE: f64 = 1e-3;
 
 /// What to do where an arc meets a triangle that the map flips.

@@ -85,7 +85,7 @@ pub fn complete_layout(
     Ok(CompletedLayout { layout, traced })
 }
 
-/// The isolines of all nodes, each once, and the map in which they are exact.
+/// The isolines of all nodes, each once, and the map with the vertices on them moved onto them.
 fn separatrices(
     mesh: &TriMesh,
     map: &SeamlessMap,

@@ -1,4 +1,4 @@
-//! Traced isolines as sequences of points of the mesh, which the overlay makes edge paths of.
+//! Traced isolines as sequences of points of the mesh, from which the overlay makes edge paths.
 
 use glam::DVec3;
 
@@ -11,8 +11,8 @@ use crate::param::SeamlessMap;
 pub(super) enum Point {
     /// A vertex of the mesh.
     Vertex(VertexId),
-    /// The crossing of a half-edge of the triangle that is left, as a fraction from its origin, and the isoline in the
-    /// chart of that triangle.
+    /// The crossing of a half-edge of the triangle that is left, its position as a fraction from the origin, and the
+    /// isoline in the chart of that triangle.
     Edge(HalfedgeId, f64, Line),
 }
 

@@ -1,3 +1,5 @@
+//! Tracing of single isolines, their points, and their crossings in the overlay.
+
 use glam::{DVec2, DVec3};
 
 use crate::embed::trace::error::TraceError;

@@ -10,14 +10,14 @@ use glam::DVec2;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
-/// Distance from its end, as a fraction of an edge, below which a crossing is replaced by the vertex: it would leave a
-/// sliver.
+/// Distance of a crossing from an end of its edge, as a fraction of the edge, below which the isoline is led through
+/// the vertex: the crossing would leave a sliver.
 const SNAP: f64 = 1e-4;
 /// Distance from a line below which a point counts as on it, as a fraction of the square root of the map's area: the
 /// rounding errors of the map.
 const ROUNDING: f64 = 1e-9;
-/// The largest fraction of an edge that may count as rounding: in a triangle smaller than the rounding errors of the
-/// map, a crossing in the middle of an edge still is one.
+/// Largest fraction of an edge that may count as rounding: also in a triangle smaller than the rounding errors of the
+/// map, a crossing in the middle of an edge is not moved to a vertex.
 const MAX_ROUNDING: f64 = 0.3;
 
 /// A directed isoline in the chart of a triangle.
@@ -299,7 +299,7 @@ impl Isolines<'_> {
         found.into_iter().map(|f| f.1).collect()
     }
 
-    /// Which of the isolines `outgoing` from the node where a trace ends is the reversed trace.
+    /// The index of the reversed trace among the isolines `outgoing` from the node where a trace ends.
     pub fn arrival(&self, steps: &[Step], outgoing: &[OutgoingIsoline]) -> Option<usize> {
         let (corner, line) = match *steps {
             [.., Step::Edge(h, line), Step::Vertex(..)] => {

@@ -1,7 +1,7 @@
 //! From a seamless map to arcs and patches: isolines are traced, matched with the arcs of the layout and overlaid with
 //! the mesh; patches are cut out as rectangles.
 //!
-//! The room takes a mesh, a map and a layout. It does not know how the map was computed.
+//! The module takes a mesh, a map and a layout. It does not know how the map was computed.
 
 pub(in crate::embed) mod arcs;
 pub(in crate::embed) mod completion;

@@ -250,7 +250,7 @@ struct Corner {
     sides: u8,
 }
 
-/// The corners of an equilateral triangle.
+/// The corners of an equilateral triangle of side 1.
 const EQUILATERAL: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::new(0.5, 0.866_025_403_784_438_6)];
 
 impl Corner {
@@ -330,8 +330,8 @@ impl Subdivision {
         Ok(())
     }
 
-    /// Triangulates a convex polygon such that the worst triangle has the best quality, by dynamic programming over its
-    /// diagonals.
+    /// Triangulates a convex polygon such that the least quality of a triangle is largest, by dynamic programming over
+    /// the diagonals.
     fn triangulate(&mut self, f: FaceId, polygon: &[Corner]) {
         let n = polygon.len();
         let mut best = vec![(f64::INFINITY, 0); n * n];

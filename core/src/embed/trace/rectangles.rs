@@ -15,7 +15,7 @@ use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
 
-/// Largest deviation from a rectangle that counts as rounding, relative to half its circumference.
+/// Largest deviation from a rectangle that counts as rounding, relative to the sum of its width and height.
 const ROUNDING: f64 = 1e-9;
 
 /// Why the patches of a traced layout are not rectangles.
@@ -34,7 +34,7 @@ pub enum RectangleError {
         /// The largest distance of a point from where it should be.
         deviation: f64,
     },
-    /// Stopped from outside.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -1,4 +1,4 @@
-//! Sample meshes for the tests of this room, with exact seamless maps and layouts whose arcs are isolines of them.
+//! Sample meshes for the tests of this module, with exact seamless maps and layouts whose arcs are isolines of them.
 
 use std::collections::BTreeMap;
 

@@ -1,9 +1,9 @@
-//! Separatrix matching: which isoline of its nodes each arc is.
+//! Separatrix matching: the assignment of isolines to arcs.
 //!
-//! As many isolines leave a node as it has arcs, in the same cyclic order, so that the arcs of a node are determined by
-//! one of them: by a rotation. All isolines are traced from all nodes to the next node. Each node is then rotated such
-//! that as many of its arcs as possible end at the right node, after the right length, as the isoline that the other
-//! node assigns to the arc. Among equal rotations, the one wins that agrees with the headings of the chains.
+//! As many isolines leave a node as it has arcs, in the same cyclic order, so that a cyclic shift, the rotation,
+//! assigns all of them. All isolines are traced from all nodes to the next node. Each node is then rotated such that as
+//! many of its arcs as possible end at the right node, after the right length, as the isoline that the other node
+//! assigns to the arc. Among equal rotations, the one wins that agrees with the headings of the chains.
 
 use crate::embed::trace::error::TraceError;
 use crate::embed::trace::isolines::{Isolines, OutgoingIsoline, Step, Stop, TracedIsoline, corner_uv};
@@ -12,7 +12,6 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::param::{SeamlessMap, Transition, turn};
 
 /// Largest relative difference between the length of an isoline and that of its arc's chain which counts as rounding.
-///
 pub(super) const LENGTH_TOLERANCE: f64 = 1e-6;
 /// Largest number of rounds in which nodes are rotated to fit their neighbours. Agreement spreads from nodes with a
 /// unique best rotation, mostly in one round.

@@ -1,4 +1,4 @@
-//! What holds of every traced layout, and helpers of the tests of this room.
+//! Checks that every traced layout must pass, and helpers for the tests of this module.
 
 use std::collections::BTreeMap;
 
@@ -108,7 +108,7 @@ fn check_patch_maps(mesh: &TriMesh, layout: &QuadLayout, traced: &TracedLayout, 
     }
 }
 
-/// All rectangles have this size, in one of the two orders.
+/// Checks that all rectangles have this size, in one of the two orders.
 pub(super) fn sizes_are(maps: &[PatchMap], size: DVec2) {
     for m in maps {
         assert!(m.size.distance(size) < 1e-12 || m.size.distance(DVec2::new(size.y, size.x)) < 1e-12, "{}", m.size);

@@ -1,3 +1,5 @@
+//! Tracing of layouts, completion and rectangles, on maps whose layouts are known.
+
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
@@ -26,7 +28,7 @@ fn a_square_is_one_patch() {
 }
 
 #[test]
-fn arcs_inside_a_square_are_straight() {
+fn arcs_inside_a_square_divide_it_into_equal_rectangles() {
     for (n, k) in [(6, 2), (8, 2), (12, 3), (12, 4)] {
         for shake in [0.0, 1e-7, 1e-3, 0.3] {
             let s = samples::square(n, k, shake);
@@ -42,7 +44,7 @@ fn arcs_inside_a_square_are_straight() {
 }
 
 #[test]
-fn slanted_arcs_on_a_torus_are_closed() {
+fn slanted_arcs_on_a_torus_are_traced() {
     for n in [1, 2, 3, 4] {
         for shake in [0.0, 1e-7, 0.2, 0.3] {
             let (traced, maps) = rectangles(&samples::slanted_torus(n, shake));
@@ -199,10 +201,10 @@ fn completion_with_all_nodes_yields_the_layout() {
     let mut list = vec![samples::slanted_torus(2, 0.0), samples::slanted_torus(3, 0.3), samples::cube(4, 2, 0.3)];
     list.extend([samples::square(12, 3, 0.3), samples::square(8, 1, 0.0), samples::cone(5, 4, 0.2)]);
     for s in list {
-        let e = completed(&s.mesh, &s.map, &s.nodes);
-        assert_eq!(cycles(&e.layout), cycles(&s.layout));
-        assert_eq!(e.layout.nodes, s.layout.nodes);
-        assert_eq!((e.layout.arcs.len(), e.layout.chords), (s.layout.arcs.len(), s.layout.chords));
+        let c = completed(&s.mesh, &s.map, &s.nodes);
+        assert_eq!(cycles(&c.layout), cycles(&s.layout));
+        assert_eq!(c.layout.nodes, s.layout.nodes);
+        assert_eq!((c.layout.arcs.len(), c.layout.chords), (s.layout.arcs.len(), s.layout.chords));
     }
 }
 
@@ -211,12 +213,12 @@ fn completion_adds_regular_nodes_at_crossings_and_ends() {
     for shake in [0.0, 0.2] {
         let s = samples::cone(3, 4, shake);
         assert_eq!(irregular(&s).len(), 4);
-        let e = completed(&s.mesh, &s.map, &irregular(&s));
-        assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (7, 9, 3));
+        let c = completed(&s.mesh, &s.map, &irregular(&s));
+        assert_eq!((c.layout.nodes.len(), c.layout.arcs.len(), c.layout.patches.len()), (7, 9, 3));
 
         let s = samples::cube(6, 2, shake);
-        let e = completed(&s.mesh, &s.map, &irregular(&s));
-        assert_eq!((e.layout.nodes.len(), e.layout.arcs.len(), e.layout.patches.len()), (8, 12, 6));
+        let c = completed(&s.mesh, &s.map, &irregular(&s));
+        assert_eq!((c.layout.nodes.len(), c.layout.arcs.len(), c.layout.patches.len()), (8, 12, 6));
     }
 }
 
@@ -236,20 +238,20 @@ fn the_base_complex_of_a_slanted_cube_is_the_lattice() {
             let (mesh, map) = samples::cube_map(n, shake, along);
             let corners = cube_corners(&mesh);
             assert_eq!(corners.len(), 8);
-            let e = completed(&mesh, &map, &corners);
-            assert_eq!(e.layout.n_irregular(), 8);
+            let c = completed(&mesh, &map, &corners);
+            assert_eq!(c.layout.n_irregular(), 8);
             let patches = 6 * (a * a + b * b) as usize;
-            assert_eq!((e.layout.nodes.len(), e.layout.patches.len()), (patches + 2, patches));
+            assert_eq!((c.layout.nodes.len(), c.layout.patches.len()), (patches + 2, patches));
         }
     }
 }
 
 /// The sample of a layout whose arcs are edges of the mesh; chains run beside them, on the left.
-fn beside(e: &CompletedLayout) -> Sample {
-    let (mesh, map) = (e.traced.mesh.clone(), e.traced.map.clone());
-    let nodes = e.traced.embedding.nodes.iter().map(|&v| VertexId(v)).collect();
+fn beside(c: &CompletedLayout) -> Sample {
+    let (mesh, map) = (c.traced.mesh.clone(), c.traced.map.clone());
+    let nodes = c.traced.embedding.nodes.iter().map(|&v| VertexId(v)).collect();
     let mut chains = Vec::new();
-    for path in &e.traced.embedding.arcs {
+    for path in &c.traced.embedding.arcs {
         let leaving =
             |i: usize| mesh.outgoing(VertexId(path[i])).find(|&h| mesh.target(h) == VertexId(path[i + 1])).unwrap();
         let start = leaving(0);
@@ -266,7 +268,7 @@ fn beside(e: &CompletedLayout) -> Sample {
         let heading = (0..4u8).max_by(|&a, &b| along(a).total_cmp(&along(b))).unwrap();
         chains.push(samples::OwnedChain { start, crossed, end: mesh.next(h), heading });
     }
-    Sample { mesh, map, layout: e.layout.clone(), nodes, chains }
+    Sample { mesh, map, layout: c.layout.clone(), nodes, chains }
 }
 
 #[test]
@@ -274,10 +276,10 @@ fn arcs_along_edges_of_the_mesh_are_traced_along_them() {
     for (n, shake) in [(4, 0.0), (5, 0.2)] {
         let (mesh, map) = samples::cube_map(n, shake, DVec2::new(2.0, 1.0).normalize());
         let corners = cube_corners(&mesh);
-        let e = completed(&mesh, &map, &corners);
-        let (traced, maps) = rectangles(&beside(&e));
-        assert_eq!(traced.mesh.n_vertices(), e.traced.mesh.n_vertices());
-        assert_eq!(traced.embedding.arcs, e.traced.embedding.arcs);
+        let c = completed(&mesh, &map, &corners);
+        let (traced, maps) = rectangles(&beside(&c));
+        assert_eq!(traced.mesh.n_vertices(), c.traced.mesh.n_vertices());
+        assert_eq!(traced.embedding.arcs, c.traced.embedding.arcs);
         sizes_are(&maps, DVec2::splat(0.2f64.sqrt()));
     }
 }

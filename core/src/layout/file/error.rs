@@ -178,7 +178,8 @@ pub enum PartialEmbeddingError {
     },
 }
 
-/// Largest valence of a node: far above useful valences, far below the overflow of sums.
+/// Largest valence of a node in a file: far above useful valences, and small enough that sums of valences do not
+/// overflow.
 pub(super) const MAX_VALENCE: u32 = 1000;
 
 fn crossing(first: u32, second: u32) -> String {

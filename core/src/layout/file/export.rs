@@ -1,4 +1,4 @@
-//! From edge paths in a refined mesh to a layout file.
+//! Conversion of edge paths in a refined mesh to a layout file.
 //!
 //! A refinement has a chain of vertices along each edge of the mesh, and vertices inside its triangles. Only the
 //! crossings of an arc with mesh edges are written: their order along each edge determines the embedding up to
@@ -241,7 +241,7 @@ impl Refinement<'_> {
                 let [a, b, c] = self.base.face_vertices(face).map(|v| self.base.position(v));
                 let p = self.mesh.positions[v as usize];
                 let normal = self.base.face_normal(face);
-                // Weights are kept positive: on the border of the triangle the file would mean another position.
+                // Weights are kept positive: a weight of zero would place the point on the border of the triangle.
                 let parts = [(b, c), (c, a), (a, b)].map(|(x, y)| (x - p).cross(y - p).dot(normal));
                 let total = parts.iter().map(|w| w.max(0.0)).sum::<f64>().max(f64::MIN_POSITIVE);
                 let inner = parts.map(|w| (w / total).max(MIN_SEPARATION));

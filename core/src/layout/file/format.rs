@@ -88,7 +88,7 @@ pub enum LayoutFileError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a layout file.
@@ -96,7 +96,7 @@ pub enum LayoutFileError {
     Format {
         /// The file.
         path: PathBuf,
-        /// Where and why.
+        /// The place and kind of the error.
         source: serde_json::Error,
     },
     /// The version of the format is unknown.

@@ -84,7 +84,7 @@ impl Insertion<'_> {
             match place {
                 Place::Vertex(v) => {
                     nodes[n] = v.0;
-                    self.take(v.0, LayoutElement::Node(n as u32))?;
+                    self.assign(v.0, LayoutElement::Node(n as u32))?;
                 }
                 Place::Edge(e, t) => on_edges.push((e, t, LayoutElement::Node(n as u32), 0)),
                 Place::Inside(f) => nodes[n] = self.insert_inside(file, n as u32, f, &nodes, &mut pieces)?,
@@ -96,7 +96,7 @@ impl Insertion<'_> {
                 match point.place {
                     Place::Vertex(v) => {
                         point.vertex = v.0;
-                        self.take(v.0, LayoutElement::Arc(a as u32))?;
+                        self.assign(v.0, LayoutElement::Arc(a as u32))?;
                     }
                     Place::Edge(e, t) => on_edges.push((e, t, LayoutElement::Arc(a as u32), k)),
                     Place::Inside(_) => {}
@@ -126,11 +126,11 @@ impl Insertion<'_> {
             }
             self.on_edge.insert(run[0].0, run.iter().map(|x| x.2).collect());
             let (mut rest, mut from) = (self.whole_edge(run[0].0), 0.0);
-            for &(_, t, part, k) in run {
+            for &(_, t, element, k) in run {
                 let x = self.mesh.split_edge(rest, (t - from) / (1.0 - from));
                 (rest, from) = (self.mesh.vertex_halfedge(x), t);
-                self.owner.insert(x, part);
-                match part {
+                self.owner.insert(x, element);
+                match element {
                     LayoutElement::Node(n) => nodes[n as usize] = x,
                     LayoutElement::Arc(a) => arcs[a as usize][k].vertex = x,
                 }
@@ -147,9 +147,9 @@ impl Insertion<'_> {
     }
 
     /// Assigns a vertex to a node or arc.
-    fn take(&mut self, vertex: u32, part: LayoutElement) -> Result<(), PartialEmbeddingError> {
-        match self.owner.insert(vertex, part) {
-            Some(first) => Err(PartialEmbeddingError::Meet { first, second: part }),
+    fn assign(&mut self, vertex: u32, element: LayoutElement) -> Result<(), PartialEmbeddingError> {
+        match self.owner.insert(vertex, element) {
+            Some(first) => Err(PartialEmbeddingError::Meet { first, second: element }),
             None => Ok(()),
         }
     }
@@ -319,7 +319,8 @@ impl Insertion<'_> {
     fn insert_on_edge(&mut self, arc: u32, [from, to]: [ArcPoint; 2]) -> Result<Vec<u32>, PartialEmbeddingError> {
         let (p, q) = (from.vertex, to.vertex);
         let edge = from.place.common_edge(self.base, to.place);
-        let between = |part: &LayoutElement| self.owner.get(&p) != Some(part) && self.owner.get(&q) != Some(part);
+        let between =
+            |element: &LayoutElement| self.owner.get(&p) != Some(element) && self.owner.get(&q) != Some(element);
         let meet = |first: LayoutElement| PartialEmbeddingError::Meet { first, second: LayoutElement::Arc(arc) };
         let Some(h) = self.mesh.find(p, q).filter(|&h| self.mesh.base_halfedge(h).is_some()) else {
             let there = edge.and_then(|e| self.on_edge.get(&e)).and_then(|list| list.iter().copied().find(between));

@@ -1,4 +1,4 @@
-//! The map of least energy of a domain without flipped triangles, the rest of the map held fixed.
+//! Minimisation of the energy of a domain without flipped triangles, with the rest of the map fixed.
 //!
 //! Every triangle is confined to a convex cone of maps: `|(c, d)| ≤ κ r·(a, b) − δ`, where the frame `r` is a unit
 //! vector near the direction of the similarity part. The constraint implies `det J > 0` (Lipman, Bounded Distortion
@@ -20,9 +20,10 @@ use crate::solve::{Affine, ConeProgram};
 const MAX_RATIO: f64 = 0.95;
 /// `δ`, the distance of the cones' apices from zero, relative to the target: no triangle collapses to a point.
 const APEX: f64 = 1e-3;
-/// Most cone programs per domain. Violated constraints that were not imposed are added from one to the next.
+/// Largest number of cone programs per domain. Constraints that were left out but are violated are added from one to
+/// the next.
 const MAX_PROGRAMS: usize = 6;
-/// How often the frames are set to the directions found.
+/// Number of times that the frames are set to the directions found.
 const FRAME_UPDATES: usize = 1;
 /// Penalty of leaving a cone by the size of the target, relative to the energy of a triangle collapsed to a point. It
 /// is above what satisfiable constraints usually cost in energy, so that only unsatisfiable ones are violated.

@@ -1,6 +1,6 @@
 //! Removal of flipped triangles from seamless maps (Campen, section 6.5.3).
 //!
-//! The least-squares objective does not see orientation: near fixed points triangles may flip. Around each group of
+//! The least-squares objective does not prevent flips: near fixed points triangles may flip. Around each group of
 //! flipped triangles the energy is minimised again. Everything outside stays in place, and each triangle inside is
 //! confined to a convex set of orientation-preserving maps ([`confined`]). Where this fails, further attempts follow,
 //! each from the best map so far:
@@ -42,12 +42,13 @@ const RELAXED_RINGS: u32 = 6;
 /// Triangles of a domain above which the relaxation follows at once instead of a larger domain. Such a domain contains
 /// many flipped triangles; the relaxation removes those that do not depend on others.
 const LARGE_DOMAIN: usize = 2000;
-/// Most triangles of a domain with shared variables; larger ones are skipped. At this size a solve takes some seconds.
+/// Largest number of triangles of a domain with shared variables; larger ones are skipped. At this size a solve takes
+/// some seconds.
 const MAX_SHARED_TRIANGLES: usize = 25_000;
-/// Most flipped triangles left by the first step for which the further steps run. Where more remain, the map as a whole
-/// does not fit its constraints.
-const MAX_STUBBORN: usize = 24;
-/// Largest mean angle of the corners at a vertex, in degrees: 180 less what the bound on distortion takes.
+/// Largest number of flipped triangles left by the first step with which the further steps run. Where more remain, the
+/// map as a whole does not fit its constraints.
+const MAX_REMAINING: usize = 24;
+/// Largest mean angle of the corners at a vertex, in degrees: below 180, since the distortion of triangles is bounded.
 const MAX_CORNER_ANGLE: f64 = 175.0;
 
 /// Which steps are taken to remove flipped triangles.
@@ -192,7 +193,8 @@ impl Removal<'_> {
     fn run(&self, y: &[f64], effort: Effort) -> Result<Candidate, Cancelled> {
         let rings = if effort == Effort::Quick { &RINGS[..QUICK_ATTEMPTS] } else { &RINGS };
         let mut best = self.confine(y, rings)?;
-        let goes_on = |best: &Candidate| effort == Effort::Thorough && best.flipped > 0 && best.flipped <= MAX_STUBBORN;
+        let goes_on =
+            |best: &Candidate| effort == Effort::Thorough && best.flipped > 0 && best.flipped <= MAX_REMAINING;
         if goes_on(&best) {
             best = self.confine_shared(&best.y)?;
         }

@@ -8,7 +8,7 @@ use crate::param::stiffening::Stiffening;
 use crate::progress::{Cancelled, Progress};
 use crate::solve::{SparseHermitian, SpdSymbolic};
 
-/// Most solves. Triangles that are still flipped then are forced so by constraints.
+/// Largest number of solves. Constraints force the flips that remain after them.
 const MAX_ROUNDS: usize = 12;
 /// Rounds without fewer flipped triangles after which stiffening stops.
 const PATIENCE: usize = 4;

@@ -147,17 +147,17 @@ fn fan(sectors: u32, quarters: u32, rings: u32, pins: &[(u32, u32, u32, DVec2)])
     Sheet { triangles, reduction: eliminate(&variables, &constraints).unwrap(), quarters }
 }
 
-/// A grid with two neighbouring vertices in the middle, each constrained to two distant vertices that draw it over the
-/// other.
+/// A grid with two neighbouring vertices in the middle, each constrained to two distant vertices such that it moves
+/// across the other.
 fn constrained(n: u32) -> Sheet {
     let mut constraints: Vec<_> = boundary(n).iter().flat_map(|&(v, to)| fix(v, to)).collect();
-    let mut tie =
+    let mut constrain =
         |a: u32, b: u32, rhs: f64| constraints.push(Constraint { terms: vec![(2 * a, 1.0), (2 * b, -1.0)], rhs });
     let (m, q) = (n / 2, n / 6);
-    tie(at(n, m, m), at(n, m, q), 0.0);
-    tie(at(n, m, m), at(n, m, n - q), 6.0);
-    tie(at(n, m + 1, m), at(n, m + 1, q), 0.0);
-    tie(at(n, m + 1, m), at(n, m + 1, n - q), -6.0);
+    constrain(at(n, m, m), at(n, m, q), 0.0);
+    constrain(at(n, m, m), at(n, m, n - q), 6.0);
+    constrain(at(n, m + 1, m), at(n, m + 1, q), 0.0);
+    constrain(at(n, m + 1, m), at(n, m + 1, n - q), -6.0);
     let quarters = vec![0; ((n + 1) * (n + 1)) as usize];
     let variables = vec![1; 2 * ((n + 1) * (n + 1)) as usize];
     Sheet { triangles: grid_triangles(n), reduction: eliminate(&variables, &constraints).unwrap(), quarters }

@@ -15,7 +15,7 @@ use crate::param::{ParamError, flipped_triangles, gradients};
 use crate::progress::Progress;
 use crate::surface::Metric;
 
-/// Most iterations; where the constraints can be reached, four mostly suffice.
+/// Largest number of iterations. Where the constraints can be reached, four usually suffice.
 const MAX_ITERATIONS: usize = 10;
 /// Smallest share of the remaining differences that an iteration must close; steps below it converge to a map that
 /// violates the constraints.
@@ -30,8 +30,8 @@ impl SeamlessSystem {
     /// Continues the locally injective map `uv` to one that satisfies the constraints. `uv` must satisfy the seam
     /// constraints of this system.
     ///
-    /// The inner error holds the triangles that would flip in the rest of the way; it is empty if `uv` is not a map of
-    /// this system.
+    /// The inner error holds the triangles that would flip if the remaining differences were closed in one step; it is
+    /// empty if `uv` is not a map of this system.
     ///
     /// # Errors
     ///

@@ -54,8 +54,8 @@ impl<'a> InjectiveEnergy<'a> {
         Self { metric, angle, objective, weights, anisotropy_share, isolines: Vec::new(), epsilon: Vec::new() }
     }
 
-    /// Adds penalties that draw half-edges onto isolines: half-edge, coordinate (0: u, 1: v) and relative penalty
-    /// weight. A weight of 1 is the usual one.
+    /// Adds penalties on the deviation of half-edges from isolines: half-edge, coordinate (0: u, 1: v) and relative
+    /// penalty weight. A weight of 1 is the usual one.
     pub fn with_isoline_penalties(mut self, list: &[(HalfedgeId, u8, f64)]) -> Self {
         if !list.is_empty() {
             self.isolines = vec![[None; 3]; self.angle.len()];

@@ -1,6 +1,6 @@
 //! Locally injective seamless maps: minimisation of an energy that is infinite for flipped triangles.
 //!
-//! The least-squares objective does not see orientation. Where a layout forces much distortion, it flips triangles that
+//! The least-squares objective does not prevent flips. Where a layout forces much distortion, it flips triangles that
 //! no local repair can restore. The descent here starts from a locally injective map and keeps it so: the energy of a
 //! triangle tends to infinity as its image degenerates, and the line search stops before that. Per triangle, with the
 //! Jacobian `J = [a b; c d]` in the frame of the field (rows `∇u`, `∇v`) and target determinant `m`, the energy density
@@ -10,10 +10,10 @@
 //!
 //! For `ρ = 1` the first term is half of `σ₁/σ₂ + σ₂/σ₁`, the conformal distortion (Hormann and Greiner, MIPS, 2000).
 //! Larger `ρ` penalises errors of direction, as the anisotropic norm does (Campen, section 6.4.3). The second term
-//! keeps sizes near the target. It is quadratic, so that small errors of size hardly affect angles, while limbs are not
-//! mapped to almost nothing. The minimiser is Newton's method with each triangle's Hessian projected to positive
-//! semidefinite (Teran, Sifakis, Irving and Fedkiw, 2005). The step size is bounded by the first triangle to degenerate
-//! (Smith and Schaefer, Bijective Parameterization with Free Boundaries, 2015, section 3.3).
+//! keeps sizes near the target. It is quadratic, so that small errors of size hardly affect angles, while protrusions
+//! are not mapped to almost nothing. The minimiser is Newton's method with each triangle's Hessian projected to
+//! positive semidefinite (Teran, Sifakis, Irving and Fedkiw, 2005). The step size is bounded by the first triangle to
+//! degenerate (Smith and Schaefer, Bijective Parameterization with Free Boundaries, 2015, section 3.3).
 //!
 //! Limits: the result depends on the initial map. [`SeamlessSystem::untangle`] obtains one from a map with few flipped
 //! triangles, [`SeamlessSystem::enforce_constraints`] from a locally injective map that violates constraints.

@@ -25,7 +25,7 @@ const EPSILON_SHARE: f64 = 0.2;
 /// Least `ε` of a flipped triangle. Triangles with a larger determinant, in multiples of the target, count as
 /// positively oriented.
 const MIN_EPSILON: f64 = 1e-6;
-/// Most Newton steps. Triangles that can be untangled are mostly so after ten.
+/// Largest number of Newton steps. Triangles that can be untangled usually are after ten.
 const MAX_STEPS: usize = 30;
 /// Steps in a row that may leave the number of flipped triangles unchanged.
 const PATIENCE: usize = 12;

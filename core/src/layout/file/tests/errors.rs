@@ -19,7 +19,7 @@ fn invalid_elements_are_reported() {
     assert_eq!(error(|f| f.arcs[3].ends[1].node = 8), PartialEmbeddingError::UnknownNode { arc: 3, node: 8, count: 8 });
     assert_eq!(
         error(|f| f.arcs[3].ends[0].slot = 7),
-        PartialEmbeddingError::UnknownSlot { arc: 3, node: f_node(3), slot: 7, last: 2 }
+        PartialEmbeddingError::UnknownSlot { arc: 3, node: first_node(3), slot: 7, last: 2 }
     );
     assert!(matches!(error(|f| f.arcs[0].ends[0].slot = 1), PartialEmbeddingError::SlotTaken { node: 0, slot: 1, .. }));
     assert_eq!(error(|f| f.nodes[2].at.weights[0] = f64::NAN), PartialEmbeddingError::Weights { node: 2 });
@@ -60,7 +60,7 @@ fn cube_node(node: usize) -> VertexId {
 }
 
 /// The first node of an arc of the cube.
-fn f_node(arc: usize) -> u32 {
+fn first_node(arc: usize) -> u32 {
     cube_file(&cube(4), 4).arcs[arc].ends[0].node
 }
 
@@ -123,7 +123,7 @@ fn crossing_arcs_are_reported() {
 
 #[test]
 fn unreadable_files_are_reported() {
-    let folder = tempfile();
+    let folder = temporary_folder();
     let path = folder.join("a.layout");
     let read = |text: &str| {
         std::fs::write(&path, text).unwrap();

@@ -27,7 +27,7 @@ fn patches(layout: &QuadLayout) -> Vec<[(u32, bool); 4]> {
 /// Writes, reads and embeds a layout; checks that it is unchanged and that its patches can be mapped.
 fn round_trip(mesh: &TriMesh, layout: &QuadLayout, embedding: &Embedding) {
     let file = LayoutFile::from_embedding(source(), mesh, layout, embedding).unwrap();
-    let folder = tempfile();
+    let folder = temporary_folder();
     let path = folder.join("a.layout");
     file.write(&path).unwrap();
     let read = LayoutFile::read(&path).unwrap();
@@ -59,7 +59,7 @@ fn round_trip(mesh: &TriMesh, layout: &QuadLayout, embedding: &Embedding) {
 }
 
 /// A new temporary folder.
-fn tempfile() -> PathBuf {
+fn temporary_folder() -> PathBuf {
     use std::sync::atomic::{AtomicU32, Ordering};
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let name = format!("plait-layout-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));

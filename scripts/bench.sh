@@ -33,7 +33,7 @@ bench() {
         echo "failed: plait bench $*" >&2
 }
 
-# table NAME...: those of the reports that there are.
+# table NAME...: a table of those reports that exist.
 table() {
     local reports=()
     for name in "$@"; do
@@ -50,7 +50,7 @@ for file in bunny_7k.off fertility_28k.obj botijo.obj rolling_stage_100k.obj; do
     bench "${file%.*}" all "$meshes/$file" --points "$points"
 done
 
-# The arm of the folder, or else a model that comes with the program. Embedding is left out: it is done once, not
+# The rocker arm of the folder, or else a model that comes with the program. Embedding is left out: it is done once, not
 # while somebody points.
 family=("$meshes/rockerarm_1k.off" 0 1 2 3 4 5)
 [[ -f ${family[0]} ]] || family=(torus 0 1 2 3)

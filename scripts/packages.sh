@@ -2,7 +2,7 @@
 
 # need PACKAGE...: installs those that are missing, or says in one line which they are and stops.
 need() {
-    command -v dpkg-query >/dev/null || return 0 # Another system: its own packages are its user's affair.
+    command -v dpkg-query >/dev/null || return 0 # Other systems: packages are left to the user.
     local package missing=()
     for package in "$@"; do
         dpkg-query --show --showformat '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed ||

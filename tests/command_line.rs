@@ -35,7 +35,7 @@ fn a_picture_is_drawn_without_a_display() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_named() {
+fn an_error_names_the_file_that_cannot_be_opened() {
     let output = plait(&["render", "no-such-mesh.obj", "--out", "x.png"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(errors(&output).contains("no-such-mesh.obj"), "{}", errors(&output));

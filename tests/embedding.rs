@@ -91,7 +91,7 @@ fn pinned_nodes_stay_and_are_written_as_fixed() {
 }
 
 #[test]
-fn whole_quads_fill_every_patch() {
+fn with_integer_sides_whole_quads_fill_every_patch() {
     let folder = tempfile::tempdir().unwrap();
     let report = embed(&script("rounded-cube"), folder.path(), &["--quiet", "--steps", "3", "--integer", "--collapse"]);
     let layout = &report["layout"];
@@ -142,8 +142,8 @@ fn mistakes_in_the_input_are_named() {
         (file("empty.layout", no_node), &[], "arcs are missing"),
         (cube.clone(), &["--pin-nodes", "99"], "no node 99"),
         (cube.clone(), &["--anisotropy", "0"], "anisotropy"),
-        (cube.clone(), &["--collapse", "0"], "length to collapse"),
-        (cube, &["--edge-length", "0"], "edge length"),
+        (cube.clone(), &["--collapse", "0"], "--collapse needs a positive length"),
+        (cube, &["--edge-length", "0"], "--edge-length must be positive"),
     ];
     for (input, more, part) in cases {
         let out = folder.path().join("out");

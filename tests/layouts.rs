@@ -74,8 +74,8 @@ fn the_field_has_the_topology_of_the_layout() {
         }
         let sum: i32 = topology.nodes.iter().map(|n| n.index()).sum();
         assert_eq!(i64::from(sum), 4 * surface.euler_characteristic(), "{name}");
-        // At every corner of a patch by a quarter from one arc to the next, and along arcs not at all: so along every
-        // cycle of arcs, around handles and boundaries, by the sum of its corners.
+        // The field turns by a quarter from one arc to the next at every corner of a patch, and not along arcs. Its
+        // turning number along a cycle of arcs, also around handles and boundaries, is the sum over the corners.
         for patch in &layout.patches {
             for i in 0..4 {
                 let ((out, forward), (into, came)) = (patch.sides[i], patch.sides[(i + 3) % 4]);
@@ -164,7 +164,7 @@ fn renumbered(InitialLayout { layout, embedding, mesh_role }: &InitialLayout) ->
 }
 
 #[test]
-fn the_map_does_not_depend_on_how_parts_are_numbered() {
+fn the_map_does_not_depend_on_the_numbering_of_nodes_and_arcs() {
     let Some(woven) = woven("cino_3holes") else { return };
     let Woven { session, initial } = &*woven;
     let energy = |initial: &InitialLayout| {
@@ -177,7 +177,7 @@ fn the_map_does_not_depend_on_how_parts_are_numbered() {
 }
 
 #[test]
-fn energy_falls_and_half_of_it_in_three_steps() {
+fn the_energy_never_rises_and_half_of_the_decrease_comes_in_three_steps() {
     for name in ["cino_3holes", "pretzel"] {
         let Some(woven) = woven(name) else { continue };
         let Woven { session, initial } = &*woven;
@@ -196,7 +196,7 @@ fn energy_falls_and_half_of_it_in_three_steps() {
 }
 
 #[test]
-fn a_boundary_is_an_isoline_edge_by_edge() {
+fn every_boundary_edge_lies_on_an_isoline() {
     let Some(path) = support::mesh("lilium.obj") else { return };
     let source = MeshSource::File(path);
     let loaded = source.load(std::path::Path::new("")).unwrap();
@@ -223,8 +223,8 @@ fn a_boundary_is_an_isoline_edge_by_edge() {
     assert!(edges > 100, "{edges}");
 }
 
-/// The layout of an icosahedron on a sphere of 1920 triangles, every face of the icosahedron divided into three patches around
-/// its centre: 12 nodes of valence 5, 20 of valence 3, and 30 regular ones.
+/// The layout of an icosahedron on a sphere of 1920 triangles, every face of the icosahedron divided into three patches
+/// around its centre: 12 nodes of valence 5, 20 of valence 3, and 30 regular ones.
 fn icosahedron() -> (Prepared, QuadLayout, Embedding) {
     icosahedron_of(2)
 }
@@ -352,24 +352,24 @@ fn an_embedding_is_transferred_to_a_proxy_and_back() {
     let to = |n: usize| {
         Some(proxy.to_proxy(&prepared.mesh, at(VertexId(initial_embedding.nodes[n]))).nearest_vertex(proxy.mesh()))
     };
-    let carried = |line: &DualCurve| proxy.polyline_to_proxy(&prepared.mesh, &line.points, line.closed).ok();
+    let transferred = |line: &DualCurve| proxy.polyline_to_proxy(&prepared.mesh, &line.points, line.closed).ok();
     let own = (&layout, &initial_embedding, prepared.mesh.n_vertices());
-    let coarse = transfer_embedding(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
+    let coarse = transfer_embedding(own, proxy.mesh(), transferred, to, &Progress::new()).unwrap().unwrap();
     check_embedding(&layout, &coarse);
-    let carried = |line: &DualCurve| proxy.polyline_to_original(&prepared.mesh, &line.points, line.closed).ok();
+    let transferred = |line: &DualCurve| proxy.polyline_to_original(&prepared.mesh, &line.points, line.closed).ok();
     let own = (&layout, &coarse, proxy.mesh().n_vertices());
     let back = transfer_embedding(
         own,
         &prepared.mesh,
-        carried,
+        transferred,
         |n| Some(VertexId(initial_embedding.nodes[n])),
         &Progress::new(),
     );
     let back = back.unwrap().unwrap();
     check_embedding(&layout, &back);
-    // Every part has its number again: nodes have their positions, and arcs lie near theirs.
+    // Nodes and arcs keep their numbers: nodes have their positions, and arcs lie near theirs.
     assert_eq!(back.nodes, initial_embedding.nodes);
-    let middle = |d: &Embedding, a: usize| d.mesh.positions[d.arcs[a][d.arcs[a].len() / 2] as usize];
+    let middle = |e: &Embedding, a: usize| e.mesh.positions[e.arcs[a][e.arcs[a].len() / 2] as usize];
     for a in 0..layout.arcs.len() {
         let off = middle(&back, a).distance(middle(&initial_embedding, a));
         assert!(off < 0.06, "arc {a} of a sphere of radius 0.3 is {off} off");
@@ -450,9 +450,9 @@ fn short_chords_are_collapsed() {
 }
 
 #[test]
-fn chords_are_removed_that_only_make_a_layout_irregular() {
+fn chords_that_only_add_irregularity_are_removed() {
     // The chords of the icosahedron go around its corners, and those of three corners of a triangle cross in it. Without
-    // two of these the corners are one node, and without the third the middle of the triangle becomes a part of it.
+    // two of these the corners are one node, and without the third the middle of the triangle joins that node.
     let (prepared, layout, initial_embedding) = icosahedron();
     let simpler = |layout: &QuadLayout| {
         let less = |c| layout.collapse(c).is_ok_and(|left| left.layout.irregularity() < layout.irregularity());

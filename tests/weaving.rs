@@ -40,7 +40,7 @@ fn steps_are_undone_and_redone() {
 }
 
 #[test]
-fn a_script_goes_on_with_a_saved_design() {
+fn a_script_continues_a_saved_design() {
     let folder = tempfile::tempdir().unwrap();
     let weave = |script: &Path, name: &str| {
         let out = folder.path().join(name);

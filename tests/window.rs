@@ -34,7 +34,7 @@ fn open_with(opener: Arc<dyn Opener>, model: &str) -> Window {
     window
 }
 
-/// Frames until `done` holds and the worker rests.
+/// Runs frames until `done` holds and the worker is idle.
 fn wait(window: &mut Window, done: impl Fn(&PlaitApp) -> bool) {
     let start = Instant::now();
     loop {
@@ -82,7 +82,7 @@ fn strips(window: &Window) -> usize {
 const FRONT: egui::Pos2 = pos2(400.0, 430.0);
 
 #[test]
-fn a_strip_is_offered_browsed_placed_hidden_and_taken_back() {
+fn a_strip_is_offered_browsed_placed_hidden_and_removed() {
     let mut window = open("torus");
     window.get_by_label("No strips placed yet");
     hover(&mut window, FRONT);
@@ -112,7 +112,7 @@ fn a_strip_is_offered_browsed_placed_hidden_and_taken_back() {
 }
 
 #[test]
-fn detail_is_chosen_with_strips_in_place_and_can_be_taken_back() {
+fn detail_can_be_changed_and_restored_with_strips_placed() {
     let mut window = open("torus");
     hover(&mut window, FRONT);
     click(&mut window, FRONT);
@@ -194,7 +194,7 @@ fn the_picture_shows_a_lit_surface() {
     assert!(used >= 5, "grey levels: {levels:?}");
 }
 
-/// Frames until `done` holds, while the worker may go on.
+/// Runs frames until `done` holds; the worker may still be busy.
 fn until(window: &mut Window, done: impl Fn(&PlaitApp) -> bool) {
     let start = Instant::now();
     while !done(window.state()) {
@@ -239,7 +239,7 @@ fn an_optimisation_is_watched_stopped_and_kept() {
     let mut window = with_layout();
     window.get_by_label("Optimise").click();
     until(&mut window, |app| first_node(app) > stand_in::moved(0));
-    // The scene is still that of before; the picture runs ahead.
+    // The scene still holds the layout before the optimisation; the view shows the latest step.
     assert_eq!(window.state().scene().unwrap().layout.as_ref().unwrap().nodes[0].position.x, stand_in::moved(0));
     assert!(window.query_by_label("Optimise").is_none());
     window.get_by_label_contains("3 flipped triangles");
@@ -254,7 +254,7 @@ fn an_optimisation_is_watched_stopped_and_kept() {
 }
 
 #[test]
-fn escape_undo_and_edits_drop_what_is_being_optimised() {
+fn escape_undo_and_edits_discard_a_running_optimisation() {
     let keys = [(egui::Key::Escape, Modifiers::NONE, 1), (egui::Key::Z, Modifiers::COMMAND, 1)];
     for (key, modifiers, strips) in keys.into_iter().chain([(egui::Key::S, Modifiers::NONE, 2)]) {
         let mut window = with_layout();
@@ -285,7 +285,7 @@ fn a_layout_is_improved_watched_stopped_and_kept() {
 }
 
 #[test]
-fn escape_drops_an_improvement() {
+fn escape_discards_an_improvement() {
     let mut window = with_layout();
     window.key_press(egui::Key::I);
     until(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() > 2));
@@ -295,7 +295,7 @@ fn escape_drops_an_improvement() {
 }
 
 #[test]
-fn other_strips_forget_the_optimised_embedding_and_say_so() {
+fn a_change_of_the_strips_discards_the_optimised_embedding_with_a_message() {
     let mut window = with_layout();
     optimise_and_stop(&mut window);
     window.key_press(egui::Key::S);
@@ -306,7 +306,7 @@ fn other_strips_forget_the_optimised_embedding_and_say_so() {
 }
 
 #[test]
-fn clicks_on_nodes_and_arcs_pin_them_and_let_them_go() {
+fn clicks_on_nodes_and_arcs_pin_and_unpin_them() {
     let mut window = with_layout();
     let layout = window.state().layout().unwrap().clone();
     let middle = layout.arcs[0].points[10];
@@ -355,14 +355,14 @@ fn the_surface_takes_the_colours_that_are_chosen() {
 }
 
 #[test]
-fn the_layout_of_a_cube_is_optimised_in_earnest() {
+fn the_window_optimises_the_layout_of_a_cube() {
     let mut window = open("rounded-cube");
     for round in 1..=3 {
         window.key_press(egui::Key::S);
         wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == round));
     }
     wait(&mut window, |app| app.scene().is_some_and(|s| s.layout.is_some()));
-    let drawn = window.state().layout().unwrap().clone();
+    let initial = window.state().layout().unwrap().clone();
     window.get_by_label("Optimise").click();
     wait(&mut window, |app| app.scene().is_some_and(|s| s.embedding.is_some()));
     let scene = window.state().scene().unwrap();
@@ -371,5 +371,5 @@ fn the_layout_of_a_cube_is_optimised_in_earnest() {
     assert!(summary.conformal < 2.05 && summary.alignment < 5.0, "{} {}", summary.conformal, summary.alignment);
     assert_eq!(summary.triangles.len(), scene.design_mesh.n_faces());
     assert_eq!((layout.nodes.len(), layout.arcs.len()), (8, 12));
-    assert_ne!(layout.nodes, drawn.nodes);
+    assert_ne!(layout.nodes, initial.nodes);
 }

@@ -243,7 +243,7 @@ pub struct ModelFacts {
 pub struct DisplaySurface {
     /// Positions.
     pub positions: Arc<Vec<DVec3>>,
-    /// Triangles, counterclockwise from outside.
+    /// Triangles, counter-clockwise seen from outside.
     pub faces: Arc<Vec<[u32; 3]>>,
     /// Normals at the corners of each face.
     pub normals: Arc<Vec<[DVec3; 3]>>,

@@ -69,7 +69,7 @@ impl MeshFile {
 
     /// The unit normal of a triangle; of a thin one that of the triangle across its longest edge.
     fn normal(&self, mut t: usize, sides: &BTreeMap<[usize; 2], Vec<usize>>, thin: f64) -> DVec3 {
-        // Thin triangles in a ring lead nowhere: after so many steps any normal is as good.
+        // Thin triangles may lead to each other in a cycle; the number of steps is bounded for that case.
         for _ in 0..64 {
             let corners = self.triangles[t];
             let [a, b, c] = corners.map(|v| self.positions[v]);

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{errors, plait, root, skip, text};
 
-/// What came of a script or a design.
+/// The output of a script or a design.
 pub struct Replay {
     /// The folder with all files.
     pub folder: PathBuf,

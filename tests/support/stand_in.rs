@@ -1,4 +1,4 @@
-//! An engine with a layout that takes as long to optimise as one likes, for tests of the window alone.
+//! An engine with a layout whose optimisation runs until it is stopped, for tests of the window alone.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -63,7 +63,7 @@ impl Session {
     }
 }
 
-/// Where the first node is after so many steps.
+/// The x coordinate of the first node after `step` steps.
 pub fn moved(step: usize) -> f64 {
     -0.1 + 0.002 * step.min(20) as f64
 }

@@ -16,7 +16,7 @@ pub enum HeadlessError {
     #[error("the graphics driver failed: {0}")]
     Device(String),
     /// The file could not be written.
-    #[error("cannot write the picture: {0}")]
+    #[error("cannot write the image: {0}")]
     Write(#[from] image::ImageError),
 }
 
@@ -27,7 +27,7 @@ pub struct Headless {
     renderer: Renderer,
 }
 
-/// Format of the picture.
+/// Format of the image.
 const OUTPUT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Headless {
@@ -116,7 +116,7 @@ impl Headless {
         let view = buffer.get_mapped_range(..).map_err(|e| HeadlessError::Device(e.to_string()))?;
         let pixels: Vec<u8> = view.chunks(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect();
         image::RgbaImage::from_raw(width, height, pixels)
-            .ok_or_else(|| HeadlessError::Device("the picture read back has the wrong size".into()))
+            .ok_or_else(|| HeadlessError::Device("the image read back has the wrong size".into()))
     }
 }
 

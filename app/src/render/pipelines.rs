@@ -50,7 +50,7 @@ impl Pipelines {
         let overlay_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/overlay.wgsl"));
         let surface = pipeline(
             device,
-            &Recipe {
+            &PipelineConfig {
                 label: "surface",
                 shader: &surface_shader,
                 entries: ["vertex_main", "fragment_main"],
@@ -65,7 +65,7 @@ impl Pipelines {
         let overlay = |label, entries, buffer: Option<wgpu::VertexBufferLayout<'static>>, blend, topology| {
             pipeline(
                 device,
-                &Recipe {
+                &PipelineConfig {
                     label,
                     shader: &overlay_shader,
                     entries,
@@ -135,7 +135,7 @@ fn target_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 }
 
 /// What distinguishes one pipeline from another.
-struct Recipe<'a> {
+struct PipelineConfig<'a> {
     label: &'a str,
     shader: &'a wgpu::ShaderModule,
     entries: [&'a str; 2],
@@ -148,33 +148,33 @@ struct Recipe<'a> {
     offscreen: bool,
 }
 
-fn pipeline(device: &wgpu::Device, recipe: &Recipe<'_>) -> wgpu::RenderPipeline {
+fn pipeline(device: &wgpu::Device, config: &PipelineConfig<'_>) -> wgpu::RenderPipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(recipe.label),
-        bind_group_layouts: recipe.layouts,
+        label: Some(config.label),
+        bind_group_layouts: config.layouts,
         ..Default::default()
     });
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(recipe.label),
+        label: Some(config.label),
         layout: Some(&layout),
         vertex: wgpu::VertexState {
-            module: recipe.shader,
-            entry_point: Some(recipe.entries[0]),
+            module: config.shader,
+            entry_point: Some(config.entries[0]),
             compilation_options: Default::default(),
-            buffers: recipe.buffer.as_ref().map(|b| [Some(b.clone())]).as_ref().map_or(&[], |b| b.as_slice()),
+            buffers: config.buffer.as_ref().map(|b| [Some(b.clone())]).as_ref().map_or(&[], |b| b.as_slice()),
         },
         fragment: Some(wgpu::FragmentState {
-            module: recipe.shader,
-            entry_point: Some(recipe.entries[1]),
+            module: config.shader,
+            entry_point: Some(config.entries[1]),
             compilation_options: Default::default(),
             targets: &[Some(wgpu::ColorTargetState {
-                format: recipe.colour,
-                blend: recipe.blend,
+                format: config.colour,
+                blend: config.blend,
                 write_mask: wgpu::ColorWrites::ALL,
             })],
         }),
-        primitive: wgpu::PrimitiveState { topology: recipe.topology, ..Default::default() },
-        depth_stencil: recipe.offscreen.then(|| wgpu::DepthStencilState {
+        primitive: wgpu::PrimitiveState { topology: config.topology, ..Default::default() },
+        depth_stencil: config.offscreen.then(|| wgpu::DepthStencilState {
             format: target::DEPTH,
             depth_write_enabled: Some(true),
             depth_compare: Some(wgpu::CompareFunction::Less),
@@ -182,7 +182,7 @@ fn pipeline(device: &wgpu::Device, recipe: &Recipe<'_>) -> wgpu::RenderPipeline 
             bias: Default::default(),
         }),
         multisample: wgpu::MultisampleState {
-            count: if recipe.offscreen { target::SAMPLES } else { 1 },
+            count: if config.offscreen { target::SAMPLES } else { 1 },
             ..Default::default()
         },
         multiview_mask: None,

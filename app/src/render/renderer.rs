@@ -6,7 +6,7 @@ use super::pipelines::{MarkerInstance, Pipelines, SegmentInstance};
 use super::scene::{Marker, Polyline, SceneInput, SurfaceMesh, Toggles, ViewUniforms};
 use super::target::Target;
 
-/// One picture to draw.
+/// One image to draw.
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// What to draw.
@@ -142,7 +142,7 @@ impl Renderer {
         }
     }
 
-    /// Draws the prepared picture in `pass`, whose viewport has the size of the frame.
+    /// Draws the prepared image in `pass`, whose viewport has the size of the frame.
     pub fn paint(&self, pass: &mut wgpu::RenderPass<'_>) {
         let Some(target) = &self.target else { return };
         pass.set_bind_group(0, &self.view_group, &[]);

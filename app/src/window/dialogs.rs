@@ -1,4 +1,4 @@
-//! File dialogs, on their own threads so that the window goes on.
+//! File dialogs, on their own threads so that the window stays responsive.
 //!
 //! The dialog of the system is opened through the desktop portal. Without a portal it returns "nothing chosen" at once.
 //! Nobody presses Cancel that fast, so such an answer opens a dialog of our own.

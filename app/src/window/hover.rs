@@ -52,7 +52,7 @@ impl Hover {
         *self = Self { calm_at: self.calm_at, point: self.point, part: self.part, ..Self::default() };
     }
 
-    /// Shows the proposal `by` further on, at most the first or the last.
+    /// Shows the proposal `by` places further on, clamped to the first and the last.
     pub fn browse(&mut self, by: i32) {
         let last = self.proposals.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(by as isize).min(last);

@@ -37,7 +37,7 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
         &[
             ("Left or middle drag", "orbit"),
             ("Right drag, Shift+middle drag", "pan"),
-            ("Ctrl+wheel, wheel beside the model, pinch", "zoom"),
+            ("Ctrl+wheel, wheel over the background, pinch", "zoom"),
             ("F", "show the whole model"),
             ("1, 2, 3, 4", "strips, region colours, layout, triangle edges"),
         ],

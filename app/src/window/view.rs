@@ -1,4 +1,4 @@
-//! The 3D view: pointer events, the picture by a paint callback, the counter of proposals beside the pointer.
+//! The 3D view: pointer events, the image, drawn by a paint callback, the counter of proposals beside the pointer.
 
 use std::sync::Arc;
 

@@ -14,7 +14,7 @@ const ROUNDS: usize = 14;
 /// Rounds of flips for angle and smoothing at the end; chosen by hand.
 const ANGLE_ROUNDS: usize = 4;
 
-/// Passes of flips. Each touches a face at most once; a few reach all.
+/// Maximum number of passes of flips. Each changes a face at most once, so several are needed to reach all edges.
 const FLIP_PASSES: usize = 6;
 
 /// An undirected edge and the faces at it.

@@ -19,7 +19,7 @@ pub struct Shape {
 impl Shape {
     /// The gradient of the field, by central differences.
     pub fn gradient(&self, p: DVec3) -> DVec3 {
-        // Small relative to all features, large relative to rounding errors of the field.
+        // Step of the differences: small relative to all features, large relative to rounding errors of the field.
         const STEP: f64 = 1e-5;
         let along = |d: DVec3| ((self.field)(p + d * STEP) - (self.field)(p - d * STEP)) / (2.0 * STEP);
         dvec3(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
@@ -92,7 +92,7 @@ fn creature() -> Shape {
 
 /// A cube with rounded edges and corners: a ball of a p-norm.
 fn rounded_cube() -> Shape {
-    // Between a ball (2) and a cube (infinity).
+    // Exponent of the norm, between a ball (2) and a cube (infinity).
     const POWER: f64 = 5.0;
     let field = |p: DVec3| p.abs().to_array().map(|x| x.powf(POWER)).iter().sum::<f64>().powf(1.0 / POWER) - 0.8;
     closed("rounded-cube", DVec3::splat(1.0), DVec3::ZERO, 0.058, field)

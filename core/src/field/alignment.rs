@@ -1,6 +1,6 @@
 //! Direction penalties: alignment of fields with principal directions, features and boundaries.
 //!
-//! Principal directions are reliable where the surface is anisotropic, that is where `κ₁ − κ₂` is large; on flat and
+//! Principal directions are reliable where the surface is anisotropic, that is, where `κ₁ − κ₂` is large; on flat and
 //! spherical parts they are noise. Campen (section 6.3.2, after Bommes et al., Mixed-Integer Quadrangulation) selects
 //! reliable triangles and gives them a penalty weight of 100. Here the weight is continuous, `(κ₁ − κ₂)²` times the
 //! triangle's area: this is how a deviation counts in the measure of alignment, it has no threshold at which the field
@@ -28,9 +28,9 @@ const FEATURE_DOMINATED: f64 = 4.0;
 /// Largest `κ₁ − κ₂` that counts, in inverse bounding-box diagonals. Curvature is averaged over balls of radius 0.03, so no
 /// bend is seen sharper; larger values stem from slivers and creases.
 const MAX_DIFFERENCE: f64 = 40.0;
-/// Anisotropy `(κ₁ − κ₂) / (|κ₁| + |κ₂|)` (0 on spheres, 1 on cylinders and saddles) up to which there is no penalty, and from
-/// which on it is full. On a sphere of 4000 points with noise of up to a thousandth of the diagonal nine tenths of the
-/// triangles have less than 0.18.
+/// Anisotropy `(κ₁ − κ₂) / (|κ₁| + |κ₂|)` (0 on spheres, 1 on cylinders and saddles) up to which there is no penalty, and
+/// from which on it is full. On a sphere of 4000 points with noise of up to a thousandth of the diagonal nine tenths of
+/// the triangles have less than 0.18.
 const ANISOTROPY: [f64; 2] = [0.2, 0.6];
 /// Least weight of a penalty, in inverse squared bounding-box diagonals: below, the direction prevails in no part of the
 /// surface.
@@ -129,7 +129,7 @@ mod tests {
     fn cylinders_and_saddles_have_penalties_and_spheres_and_planes_none() {
         assert!(penalties(&square(12)).is_empty());
         assert!(penalties(&octasphere(24)).is_empty());
-        // Of radius 0.1 and along z.
+        // Of radius 0.1, with its axis along z.
         let cylinder =
             grid(60, 50, [true, false], |u, v| DVec3::new(0.1 * (TAU * u).cos(), 0.1 * (TAU * u).sin(), 0.8 * v));
         let metric = Metric::new(&cylinder);

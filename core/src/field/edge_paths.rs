@@ -18,12 +18,12 @@ use crate::surface::Metric;
 /// directions of the edges.
 const HALF_WINDOW: f64 = 2.0;
 
-/// An edge walked in one direction.
+/// An edge with a direction of traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// The edge.
     pub edge: EdgeId,
-    /// Whether it is walked in the direction of [`TriMesh::halfedge`].
+    /// Whether it is traversed in the direction of [`TriMesh::halfedge`].
     pub forward: bool,
 }
 
@@ -39,7 +39,7 @@ impl Step {
         self.reversed().left(mesh)
     }
 
-    /// The same edge walked in the other direction.
+    /// The same edge in the other direction.
     pub fn reversed(self) -> Self {
         Self { edge: self.edge, forward: !self.forward }
     }
@@ -195,7 +195,7 @@ fn tangent_offsets(mesh: &TriMesh, metric: &Metric, steps: &[Step], closed: bool
         .collect()
 }
 
-/// Follows a curve from a step until it closes or ends at the boundary; says whether it closes.
+/// Follows a curve from a step until it closes or ends at the boundary; returns its steps, and whether it closes.
 fn follow(mesh: &TriMesh, of: &[Option<u32>], curve: u32, first: Step) -> Result<(Vec<Step>, bool), FieldError> {
     let mut steps = vec![first];
     let mut at = first;

@@ -19,13 +19,13 @@ pub struct AlignmentDirections<'a> {
     pub directions: &'a [DVec3],
     /// Penalty weight of each triangle, not negative, in units of `radius⁻²`.
     pub weights: &'a [f64],
-    /// Distance over which a direction of weight 1 prevails over smoothness.
+    /// Distance over which a direction of weight 1 prevails over smoothness, in units of the mesh.
     pub radius: f64,
 }
 
-/// The smoothest cross field aligned with the boundary of `mesh` and the edges marked `sharp` (a flag per edge; empty: none),
-/// with penalties for deviation from `directions`. Its singularities include those at boundary vertices, whose index is
-/// counted against the boundary.
+/// The smoothest cross field aligned with the boundary of `mesh` and the edges marked `sharp` (a flag per edge; empty:
+/// none), with penalties for deviation from `directions`. Its singularities include those at boundary vertices, with
+/// their index relative to the direction of the boundary.
 ///
 /// # Errors
 ///
@@ -41,13 +41,13 @@ pub fn feature_aligned_field(
         expect_length("the list of sharp edges", sharp.len(), mesh.n_edges())?;
     }
     let mut soft = SoftConstraints::default();
-    if let Some(g) = directions {
-        expect_length("the list of directions", g.directions.len(), mesh.n_faces())?;
-        expect_length("the list of weights of directions", g.weights.len(), mesh.n_faces())?;
-        let angle = |f: FaceId| metric.angle_of(mesh, f, g.directions[f.index()]);
+    if let Some(aligned) = directions {
+        expect_length("the list of directions", aligned.directions.len(), mesh.n_faces())?;
+        expect_length("the list of weights of directions", aligned.weights.len(), mesh.n_faces())?;
+        let angle = |f: FaceId| metric.angle_of(mesh, f, aligned.directions[f.index()]);
         soft.vector = mesh.faces().map(|f| c64::from_polar(1.0, 4.0 * angle(f).unwrap_or(0.0))).collect();
-        let scale = (g.radius * g.radius).max(f64::MIN_POSITIVE).recip();
-        let weight = |f: FaceId| if angle(f).is_some() { g.weights[f.index()].max(0.0) * scale } else { 0.0 };
+        let scale = (aligned.radius * aligned.radius).max(f64::MIN_POSITIVE).recip();
+        let weight = |f: FaceId| if angle(f).is_some() { aligned.weights[f.index()].max(0.0) * scale } else { 0.0 };
         soft.weight = mesh.faces().map(weight).collect();
     }
     let aligned = |e| mesh.is_boundary_edge(e) || sharp.get(e.index()).copied().unwrap_or(false);

@@ -59,7 +59,7 @@ pub struct GuidingFieldSystem {
     n_components: usize,
 }
 
-/// One solve.
+/// The system for given period jumps and penalties.
 struct Solve<'a> {
     system: &'a GuidingFieldSystem,
     penalties: &'a [DirectionPenalty],
@@ -158,7 +158,7 @@ impl Solve<'_> {
         let (matrix, factor) = self.factor(none)?;
         let multiples = vec![0; self.penalties.len()];
         let mut angle = factor.solve(&matrix, &self.rhs(&multiples, none))?;
-        let known = |g: &DirectionPenalty| g.branch.is_some();
+        let known = |p: &DirectionPenalty| p.branch.is_some();
         self.turn_towards(&mut angle, known);
         if !self.penalties.iter().any(known) || self.penalties.iter().all(known) {
             return Ok(angle);
@@ -174,11 +174,11 @@ impl Solve<'_> {
     /// these, with the others.
     fn turn_towards(&self, angle: &mut [f64], known: impl Fn(&DirectionPenalty) -> bool) {
         let mut sums = vec![[c64::new(0.0, 0.0); 2]; self.system.n_components];
-        for g in self.penalties {
-            let off = base(g) - angle[g.face.index()];
-            let kind = usize::from(!known(g));
-            let symmetry = TAU / period(g);
-            sums[self.system.component[g.face.index()] as usize][kind] += c64::from_polar(g.weight, symmetry * off);
+        for p in self.penalties {
+            let off = base(p) - angle[p.face.index()];
+            let kind = usize::from(!known(p));
+            let symmetry = TAU / period(p);
+            sums[self.system.component[p.face.index()] as usize][kind] += c64::from_polar(p.weight, symmetry * off);
         }
         let turn = |[known, open]: &[c64; 2]| {
             if known.norm() > 0.0 { known.arg() } else { open.arg() / 4.0 }
@@ -191,28 +191,28 @@ impl Solve<'_> {
 
     /// The multiple of its period to add to each penalty's angle to be nearest to `angle`.
     fn round(&self, angle: &[f64]) -> Vec<i64> {
-        self.penalties.iter().map(|g| ((angle[g.face.index()] - base(g)) / period(g)).round() as i64).collect()
+        self.penalties.iter().map(|p| ((angle[p.face.index()] - base(p)) / period(p)).round() as i64).collect()
     }
 
     /// The first triangle of each component without penalty among those `used`.
     fn unconstrained(&self, used: impl Fn(&DirectionPenalty) -> bool) -> impl Iterator<Item = usize> {
         let mut constrained = vec![false; self.system.n_components];
-        for g in self.penalties.iter().filter(|g| used(g) && g.weight > 0.0) {
-            constrained[self.system.component[g.face.index()] as usize] = true;
+        for p in self.penalties.iter().filter(|p| used(p) && p.weight > 0.0) {
+            constrained[self.system.component[p.face.index()] as usize] = true;
         }
         let component = &self.system.component;
         (0..component.len()).filter(move |&f| !std::mem::replace(&mut constrained[component[f] as usize], true))
     }
 
     /// The matrix, with the penalties that are `used`, and its factor. In components without any, the first triangle gets a
-    /// penalty for deviation from angle 0; it has that angle exactly, since turning a whole component costs nothing else.
+    /// penalty for deviation from angle 0. It takes that angle exactly, since rotating a whole component changes nothing else.
     fn factor(
         &self,
         used: impl Fn(&DirectionPenalty) -> bool,
     ) -> Result<(SparseHermitian<f64>, SpdFactor<f64>), FieldError> {
         let mut diagonal = vec![0.0; self.system.component.len()];
-        for g in self.penalties.iter().filter(|g| used(g)) {
-            diagonal[g.face.index()] += g.weight;
+        for p in self.penalties.iter().filter(|p| used(p)) {
+            diagonal[p.face.index()] += p.weight;
         }
         for f in self.unconstrained(&used) {
             diagonal[f] += 1.0;
@@ -229,8 +229,8 @@ impl Solve<'_> {
             rhs[g as usize] += w * rotation;
             rhs[f as usize] -= w * rotation;
         }
-        for (g, &l) in self.penalties.iter().zip(multiples).filter(|(g, _)| used(g)) {
-            rhs[g.face.index()] += g.weight * (base(g) + l as f64 * period(g));
+        for (p, &multiple) in self.penalties.iter().zip(multiples).filter(|(p, _)| used(p)) {
+            rhs[p.face.index()] += p.weight * (base(p) + multiple as f64 * period(p));
         }
         rhs
     }
@@ -241,7 +241,7 @@ fn inner_edges(mesh: &TriMesh) -> impl Iterator<Item = (HalfedgeId, HalfedgeId)>
     mesh.edges().map(|e| mesh.halfedge(e)).filter_map(|h| Some((h, mesh.twin(h)?)))
 }
 
-/// The matrix of the edges (triangles, weight, rotation) with what is added to its diagonal.
+/// The matrix of the edges (triangles, weight, rotation); `diagonal` is added to its diagonal.
 fn matrix(n: usize, edges: &[(u32, u32, f64, f64)], mut diagonal: Vec<f64>) -> SparseHermitian<f64> {
     for &(f, g, w, _) in edges {
         diagonal[f as usize] += w;
@@ -261,9 +261,9 @@ fn prescribed_rotation(mesh: &TriMesh, metric: &Metric, jump: &[i32], h: Halfedg
     if first == h { value } else { -value }
 }
 
-/// The index of each vertex in quarters, for jumps that are not reduced. A node there has valence `4 − index`; on the boundary
-/// `3 − index`, if the field is aligned with it. At an inner vertex the index depends on the jumps only, at a boundary vertex
-/// on the angles too. Increasing the jump of an edge by one decreases the index of the target of its
+/// The index of each vertex in quarters, for jumps that are not reduced. A node there has valence `4 − index`; on the
+/// boundary `3 − index`, if the field is aligned with it. At an inner vertex the index depends on the jumps only, at a
+/// boundary vertex on the angles too. Increasing the jump of an edge by one decreases the index of the target of its
 /// [`TriMesh::halfedge`] by one and increases that of the origin.
 pub fn indices(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<i32> {
     vertex_indices(mesh, metric, |h| {
@@ -273,12 +273,12 @@ pub fn indices(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> 
     })
 }
 
-/// The turning number, in quarters, of a closed cycle of triangles in a field of these jumps: the number of quarter turns that
-/// the direction of travel turns counter-clockwise against the crosses. Clockwise around a vertex of valence `k` it is `−k`
-/// (Campen, section 6.3.1).
+/// The turning number, in quarters, of a closed cycle of triangles in a field of these jumps: the number of quarter turns
+/// by which the tangent of the cycle turns counter-clockwise relative to the crosses. Clockwise around a vertex of
+/// valence `k` it is `−k` (Campen, section 6.3.1).
 ///
-/// `crossed` are the half-edges crossed, each of the triangle that is left. `None` if they form no closed cycle, or go back
-/// across an edge just crossed.
+/// `crossed` are the half-edges crossed, each in the triangle that the cycle leaves. `None` if they form no closed cycle,
+/// or if an edge is crossed back at once.
 pub fn turning_number(mesh: &TriMesh, metric: &Metric, jump: &[i32], crossed: &[HalfedgeId]) -> Option<i32> {
     let mut turn = 0.0;
     for (i, &h) in crossed.iter().enumerate() {

@@ -3,7 +3,7 @@
 //! A cross is an angle per triangle modulo a quarter turn; a period jump per edge says which direction of one triangle
 //! continues which of its neighbour's. Two kinds of fields are computed. Smooth fields (`cross_field`, `feature_aligned`)
 //! are solved for by their representation vectors; their singularities come out. Guiding fields (`guiding_field`) have
-//! prescribed period jumps, hence prescribed singularities; only the angles are solved for. The room uses `mesh`,
+//! prescribed period jumps, hence prescribed singularities; only the angles are solved for. The module uses `mesh`,
 //! `surface`, `solve` and `progress`.
 
 mod alignment;

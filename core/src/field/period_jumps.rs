@@ -117,7 +117,7 @@ impl Correction<'_> {
     }
 
     /// Changes jumps in the fan left of two consecutive steps (each with its tangent offset) until the second continues
-    /// the direction of the first; says whether a change was needed.
+    /// the direction of the first; returns whether a change was needed.
     fn continue_left(&mut self, (a, offset_a): (Step, f64), (b, offset_b): (Step, f64)) -> bool {
         let mesh = self.mesh;
         let (Some(fan), Some(ha), Some(hb)) = (left_fan(mesh, a, b), a.left(mesh), b.left(mesh)) else { return false };

@@ -24,11 +24,12 @@ const DECAY_LENGTH: f64 = 1.0;
 /// Largest length, and reciprocal of the smallest, relative to the mean. Without the bound only the elephant (0.29 to 3.3)
 /// and the rocker arm (2.7) would exceed it, with a residual at most 5 percent smaller; quads would be as uneven as lengths.
 const MAX_LENGTH: f64 = 2.5;
-/// Rounds of restoring the area and clamping lengths; each leaves a small part of the area that clamping took.
+/// Rounds of restoring the area and clamping lengths; after each a small part of the area removed by clamping is missing.
 const CLAMPING_ROUNDS: usize = 3;
 
-/// The residual rotation of each edge, from the triangle of [`TriMesh::halfedge`] to that of its twin: what the angle turns
-/// beyond the period jump, in radians; 0 on the boundary. Neither `jump` nor the result is reduced modulo full turns.
+/// The residual rotation of each edge, from the triangle of [`TriMesh::halfedge`] to that of its twin: the rotation of
+/// the angle beyond the period jump, in radians; 0 on the boundary. Neither `jump` nor the result is reduced modulo full
+/// turns.
 pub fn residual_rotations(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<f64> {
     let residual = |e: EdgeId| {
         let h = mesh.halfedge(e);
@@ -153,7 +154,7 @@ mod tests {
         turns.iter().map(|t| (t / FRAC_PI_2).round() as i32).collect()
     }
 
-    /// The factor by which sizing lowers the curl of a field of circles and rays, on a ring drawn out to a cone by `slope`.
+    /// The factor by which sizing lowers the curl of a field of circles and rays, on a flat ring or, with a `slope`, on a cone.
     fn gain(slope: f64) -> (f64, Vec<[f64; 2]>, TriMesh) {
         let mesh = grid(80, 12, [true, false], |u, v| {
             let r = 0.25 + 0.1 * v;

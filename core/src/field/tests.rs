@@ -105,7 +105,7 @@ fn a_curve_may_cross_itself_but_not_end_inside() {
 }
 
 #[test]
-fn penalties_turn_the_field() {
+fn the_field_follows_penalties_of_small_radius_only() {
     let mesh = torus(48, 12);
     let metric = Metric::new(&mesh);
     let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<glam::DVec3>() / 3.0;
@@ -113,7 +113,7 @@ fn penalties_turn_the_field() {
         .faces()
         .map(|f| {
             let around = glam::DVec3::Z.cross(centre(f)).normalize();
-            // Waving about the parallels.
+            // Oscillating about the parallels.
             let slant = 0.4 * (4.0 * centre(f).y.atan2(centre(f).x)).sin();
             glam::DQuat::from_axis_angle(mesh.face_normal(f), slant) * around
         })
@@ -131,7 +131,7 @@ fn penalties_turn_the_field() {
 }
 
 #[test]
-fn sharp_edges_are_followed() {
+fn the_field_is_aligned_with_sharp_edges() {
     let mesh = cells(&[[0, 0, 0]], 6);
     let metric = Metric::new(&mesh);
     let sharp: Vec<bool> = mesh
@@ -179,7 +179,7 @@ fn the_smoothed_tangent_of_a_zigzag_deviates_from_its_edges() {
 }
 
 #[test]
-fn real_shapes_keep_tens_of_singularities() {
+fn real_shapes_have_tens_of_singularities_after_cancellation() {
     for name in ["bunny_7k.off", "rockerarm_5k.obj"] {
         let Some(mesh) = research_mesh(name).map(|loaded| loaded.mesh) else { continue };
         let field = shape(&mesh);

@@ -16,7 +16,7 @@ pub fn builtin_names() -> impl ExactSizeIterator<Item = &'static str> + Clone {
     MODELS.iter().map(|(name, _)| *name)
 }
 
-/// The built-in model of this name; `None` if there is none.
+/// The built-in model of this name; `None` if there is no such model.
 pub fn builtin(name: &str) -> Option<LoadedMesh> {
     let (name, bytes) = MODELS.iter().find(|(known, _)| *known == name)?;
     parse(bytes, name).ok()

@@ -86,17 +86,17 @@ pub enum LoadError {
         /// The number of vertices.
         count: usize,
     },
-    /// A face has more corners than are triangulated.
+    /// A face has more corners than the triangulation accepts.
     #[error("{face} has {corners} corners; more than {limit} are not supported")]
     HugeFace {
         /// The face.
         face: FaceRef,
-        /// Its corners.
+        /// Number of its corners.
         corners: usize,
         /// The most corners a face may have.
         limit: usize,
     },
-    /// There is no face, or none of three different corners.
+    /// There is no face with three different corners.
     #[error("the file has no faces ({vertices} vertices)")]
     NoFaces {
         /// The number of vertices.

@@ -36,12 +36,13 @@ pub fn sharp_edges(mesh: &TriMesh, dihedral: f64) -> Vec<bool> {
     mesh.edges().map(|e| is_sharp(mesh.halfedge(e)).unwrap_or(false)).collect()
 }
 
-/// The unit normal of each face; a thin face has that of its support. Zero if that is degenerate as well.
+/// The unit normal of each face; for a thin face that of the face found by following [`support`]. Zero if that face is
+/// degenerate as well.
 fn robust_normals(mesh: &TriMesh) -> Vec<DVec3> {
     let support: Vec<FaceId> = mesh.faces().map(|f| support(mesh, f)).collect();
     let normal = |mut f: FaceId| {
-        // Longest chain of thin faces followed. Chains are short, except that thin faces may support each other in a
-        // cycle; then the last one's own normal is taken.
+        // Longest chain of thin faces followed. Chains are short, unless thin faces support each other in a cycle; then
+        // the last one's own normal is taken.
         const MAX_CHAIN: usize = 64;
         for _ in 0..MAX_CHAIN {
             if support[f.index()] == f {

@@ -107,7 +107,8 @@ impl TriMesh {
 
         let mut vertex_halfedge = vec![NONE; positions.len()];
         for (h, &v) in origin.iter().enumerate() {
-            // Prefer the half-edge without twin: turning counter-clockwise from it, one meets the whole fan.
+            // At a boundary vertex the half-edge without twin is kept: from there the counter-clockwise traversal visits the
+            // whole fan.
             if vertex_halfedge[v as usize] == NONE || twin[h] == NONE {
                 vertex_halfedge[v as usize] = h as u32;
             }
@@ -453,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_what_is_not_a_manifold() {
+    fn lists_that_are_no_oriented_manifold_are_refused() {
         let p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
         let err = |f: &[[u32; 3]]| TriMesh::from_faces(p.clone(), f).unwrap_err();
         assert!(matches!(err(&[[0, 1, 9]]), TriMeshError::UnknownVertex { vertex: 9, .. }));

@@ -1,6 +1,6 @@
 //! Triangle meshes: half-edge structure, loading and repair, topology, feature edges, traversals.
 //!
-//! The first room after the numerics: everything about a surface that needs no geometry processing. Of this crate it uses
+//! The lowest module after `solve`: everything about a mesh that needs no geometry processing. Of this crate it uses
 //! `progress` and `union_find` only.
 
 mod builtin;

@@ -62,7 +62,7 @@ fn moved_vertex(mesh: &TriMesh, v: VertexId, is_crease: &impl Fn(EdgeId) -> bool
         }
     }
     match n_creases {
-        // Where a crease ends the vertex is smoothed as if there were none.
+        // The end of a crease is smoothed like a vertex without creases.
         0 | 1 => {
             let weight = if n == 3.0 { 3.0 / 16.0 } else { 3.0 / (8.0 * n) };
             at * (1.0 - n * weight) + sum * weight

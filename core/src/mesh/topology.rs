@@ -93,7 +93,7 @@ fn boundary_loops(mesh: &TriMesh) -> Vec<Vec<HalfedgeId>> {
         while !seen[h.index()] {
             seen[h.index()] = true;
             boundary.push(h);
-            // A boundary vertex has just one outgoing half-edge without twin, and it is the one kept for it.
+            // `vertex_halfedge` of a boundary vertex is its only outgoing half-edge without twin.
             h = mesh.vertex_halfedge(mesh.target(h));
         }
         if !boundary.is_empty() {
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_annulus_and_a_tetrahedron() {
+    fn components_boundary_loops_and_genus_are_found() {
         // Triangles between an inner and an outer triangle, and a tetrahedron apart.
         let p: Vec<DVec3> = (0..10).map(|i| DVec3::new(f64::from(i), f64::from(i * i), f64::from(i % 3))).collect();
         let mut faces = Vec::new();

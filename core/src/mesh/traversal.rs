@@ -15,7 +15,7 @@
 //! So the kind of element (vertices, faces, half-edges, or elements of another mesh by their numbers), the filter, the
 //! length and the end of the search are the caller's own code. Results do not depend on the machine or on hash seeds:
 //! elements at equal distance are settled by ascending id, a label is replaced by a strictly smaller distance only,
-//! and of equally short ways the one reached first stays.
+//! and of equally short paths the one found first stays.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -145,8 +145,8 @@ fn path<N: Copy, V>(to: N, step: impl Fn(N) -> Option<Option<V>>, before: impl F
     Some(steps)
 }
 
-/// Dijkstra's algorithm from one or several starts. `N` are the elements, `V` says by which step one was reached, for
-/// instance the half-edge walked along or crossed.
+/// Dijkstra's algorithm from one or several starts. `N` are the elements, `V` is the step by which one was reached, for
+/// instance the half-edge that was followed or crossed.
 ///
 /// Lengths must not be negative. Elements are settled by ascending distance, those at equal distance by ascending id,
 /// each once. The label of an element changes only where a strictly smaller distance is found.
@@ -168,13 +168,13 @@ impl<N: Element, V: Copy> Dijkstra<N, V> {
         Self { labels: Labels::Sparse(HashMap::new()), reached: Vec::new(), queue: DistanceQueue::new() }
     }
 
-    /// Starts from an element at a distance; says whether that is less than it had. Also allowed once elements are
-    /// settled, for instance to go on with another component.
+    /// Starts from an element at a distance; returns whether that is less than its present distance. Also allowed once
+    /// elements are settled, for instance to go on with another component.
     pub fn start(&mut self, at: N, distance: f64) -> bool {
         self.label(at, distance, None)
     }
 
-    /// Offers a way to an element; says whether it is shorter than the one known.
+    /// Offers a path to an element; returns whether it is shorter than the one known.
     #[inline]
     pub fn reach(&mut self, at: N, distance: f64, via: V) -> bool {
         self.label(at, distance, Some(via))
@@ -197,7 +197,7 @@ impl<N: Element, V: Copy> Dijkstra<N, V> {
     pub fn settle(&mut self) -> Option<(N, f64)> {
         loop {
             let (distance, at) = self.queue.pop()?;
-            // A larger distance is that of a way replaced since.
+            // An entry with a larger distance belongs to a path that was replaced since.
             if self.labels.get(at.index()).is_some_and(|(known, _)| distance <= known) {
                 return Some((at, distance));
             }
@@ -221,7 +221,7 @@ impl<N: Element, V: Copy> Dijkstra<N, V> {
         &self.reached
     }
 
-    /// The steps of the shortest way known to an element, from a start on; `None` where it was not reached. `before` is
+    /// The steps of the shortest path known to an element, from a start on; `None` where it was not reached. `before` is
     /// the element that a step leaves.
     pub fn path_to(&self, to: N, before: impl Fn(&V) -> N) -> Option<Vec<V>> {
         path(to, |at| self.labels.get(at.index()).map(|(_, via)| via), before)
@@ -235,7 +235,7 @@ impl<N: Element, V: Copy> Dijkstra<N, V> {
 }
 
 /// Breadth-first search from one or several starts: elements are visited in the order in which they were reached, hence
-/// by ascending number of steps from the starts. `V` says by which step an element was reached.
+/// by ascending number of steps from the starts. `V` is the step by which an element was reached.
 #[derive(Debug, Clone)]
 pub struct BreadthFirst<N, V> {
     labels: Labels<(u32, Option<V>)>,
@@ -257,13 +257,13 @@ impl<N: Element, V: Copy> BreadthFirst<N, V> {
         Self { labels: Labels::Sparse(HashMap::new()), reached: Vec::new(), visited: 0, depth: 0 }
     }
 
-    /// Starts from an element; says whether it had not been reached before. Also allowed once elements are visited, for
+    /// Starts from an element; returns whether it had not been reached before. Also allowed once elements are visited, for
     /// instance to go on with another component.
     pub fn start(&mut self, at: N) -> bool {
         self.label(at, 0, None)
     }
 
-    /// Reaches an element from the one visited last; says whether it had not been reached before.
+    /// Reaches an element from the one visited last; returns whether it had not been reached before.
     #[inline]
     pub fn reach(&mut self, at: N, via: V) -> bool {
         self.label(at, self.depth + 1, Some(via))
@@ -311,7 +311,7 @@ impl<N: Element, V: Copy> BreadthFirst<N, V> {
         &self.reached
     }
 
-    /// The steps of a way of fewest steps to an element, from a start on; `None` where it was not reached. `before` is
+    /// The steps of a path of fewest steps to an element, from a start on; `None` where it was not reached. `before` is
     /// the element that a step leaves.
     pub fn path_to(&self, to: N, before: impl Fn(&V) -> N) -> Option<Vec<V>> {
         path(to, |at| self.labels.get(at.index()).map(|(_, via)| via), before)
@@ -349,8 +349,8 @@ pub fn components<N: Element, I: IntoIterator<Item = N>>(n: usize, neighbours: i
     (component, count as usize)
 }
 
-/// Dilates a set of vertices by `rings`: each time, all vertices join that share a cell (a triangle or a quad, given by
-/// its corners) with a vertex of the set.
+/// Dilates a set of vertices by `rings`: each ring adds the vertices that share a cell (a triangle or a quad, given by its
+/// corners) with a vertex of the set.
 pub fn dilate<N: Element, const K: usize>(
     marked: &mut [bool],
     rings: usize,

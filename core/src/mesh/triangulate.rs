@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 use super::error::LoadError;
 use super::read::RawMesh;
 
-/// Most corners of a polygon. Ear clipping takes quadratic time; chosen by hand, far above what files hold.
+/// Maximum number of corners of a polygon. Ear clipping takes quadratic time. Chosen by hand, far above what files contain.
 const MAX_CORNERS: usize = 10_000;
 
 /// The triangles of a file, each with the polygon it comes from.
@@ -85,7 +85,7 @@ fn clip_ears(outline: &mut Vec<u32>, positions: &[DVec3], edges: &mut Edges, fac
         let n = outline.len();
         let mut best = best_of(&score);
         if score[best] <= 0.0 {
-            // No ear is known: clipping elsewhere may have made some.
+            // No ear is known, but clipping elsewhere may have created some.
             score = (0..n).map(|i| ear_score(&flat, outline, edges, i)).collect();
             best = best_of(&score);
         }
@@ -130,12 +130,12 @@ fn ear_score(flat: &[DVec2], outline: &[u32], edges: &Edges, i: usize) -> f64 {
     }
     let blocked = (0..n).any(|j| {
         let p = flat[j];
-        // A corner at the place of one of the ear's own does not lie inside it.
+        // A corner at the position of one of the ear's corners does not lie inside the ear.
         ![before, i, after].contains(&j)
             && ![a, b, c].contains(&p)
             && [(a, b), (b, c), (c, a)].iter().all(|&(s, t)| (t - s).perp_dot(p - s) >= 0.0)
     });
-    // Of a quad both triangles count.
+    // Clipping one ear of a quad also fixes the other triangle: the worse of both counts.
     let quality = if n == 4 { quality.min(self::quality(a, c, flat[(i + 2) % n])) } else { quality };
     match (blocked || quality <= 0.0, edges.contains(outline[before], outline[after])) {
         (true, _) => quality.min(0.0),

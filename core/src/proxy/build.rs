@@ -25,8 +25,8 @@ const REPORT_INTERVAL: u32 = 1 << 16;
 /// Why a proxy cannot be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ProxyError {
-    /// The list of sharp edges is not one of this mesh.
-    #[error("{given} flags of sharp edges for a mesh of {edges} edges")]
+    /// The list of sharp edges does not have one flag per edge of the mesh.
+    #[error("the list of sharp edges has {given} flags, the mesh {edges} edges")]
     Sharp {
         /// Number of flags.
         given: usize,

@@ -112,7 +112,7 @@ impl Connectivity {
         [0, 1, 2].map(|i| self.origin[3 * face as usize + i])
     }
 
-    /// Calls `visit` with the outgoing half-edges of a vertex, counter-clockwise from the boundary.
+    /// Calls `visit` with the outgoing half-edges of a vertex, counter-clockwise; at a boundary vertex from the boundary on.
     #[inline]
     pub fn for_spokes(&self, v: u32, mut visit: impl FnMut(u32)) {
         let first = self.spoke[v as usize];

@@ -19,7 +19,7 @@ impl Proxy {
     ///
     /// # Errors
     ///
-    /// A curve that is not one on the proxy, or an original too rough along it.
+    /// [`CurveTransferError`]: the curve does not lie on the proxy, or the original is too rough along it.
     pub fn curve_to_original(
         &self,
         original: &TriMesh,
@@ -34,7 +34,7 @@ impl Proxy {
     ///
     /// # Errors
     ///
-    /// An original too rough along the polyline, or a polyline of fewer than two points.
+    /// [`CurveTransferError`]: the original is too rough along the polyline, or the polyline has fewer than two points.
     pub fn polyline_to_original(
         &self,
         original: &TriMesh,
@@ -56,7 +56,7 @@ impl Proxy {
     ///
     /// # Errors
     ///
-    /// A curve that is not one on the original, or one smaller than the triangles of the proxy.
+    /// [`CurveTransferError`]: the curve does not lie on the original, or is smaller than the triangles of the proxy.
     pub fn curve_to_proxy(&self, original: &TriMesh, curve: &SurfaceCurve) -> Result<SurfaceCurve, CurveTransferError> {
         curve.check(original)?;
         let points = (0..curve.crossings.len()).map(|i| curve.surface_point(original, i));
@@ -67,7 +67,7 @@ impl Proxy {
     ///
     /// # Errors
     ///
-    /// A polyline smaller than the triangles of the proxy, or of fewer than two points.
+    /// [`CurveTransferError`]: the polyline is smaller than the triangles of the proxy, or has fewer than two points.
     pub fn polyline_to_proxy(
         &self,
         original: &TriMesh,

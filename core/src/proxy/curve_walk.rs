@@ -16,7 +16,7 @@ use crate::surface::{Crossing, CurveError, SurfaceCurve, SurfacePoint, nearest_i
 
 /// Least distance of crossings from vertices, in edge parameters; the same as for geodesics.
 pub(super) const VERTEX_DISTANCE: f64 = 1e-3;
-/// Segments of the guide from which tracing is tried, at most.
+/// Maximum number of segments of the guide from which tracing is tried.
 const STARTS: usize = 12;
 /// Triangles around a start in which an edge with different signs is searched.
 const START_FACES: usize = 200;
@@ -28,10 +28,10 @@ const LENGTH_FACTOR: f64 = 1.6;
 /// Why a curve cannot be transferred to the other mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CurveTransferError {
-    /// The curve is not one on the mesh it is transferred from.
+    /// The curve does not lie on the mesh that it is transferred from.
     #[error(transparent)]
     Curve(#[from] CurveError),
-    /// The other mesh has no strip of triangles along the curve that closes, or that ends where the curve does.
+    /// On the other mesh no strip of triangles along the curve closes, or ends where the curve ends.
     #[error("no strip of triangles follows the curve on the other mesh (mesh or proxy)")]
     NoStrip,
     /// The curve found is much longer or shorter: the original is too rough there.

@@ -1,7 +1,7 @@
 //! Closed curves along shortest dual paths between given triangles: the transfer of curves that cannot be traced.
 //!
-//! Where a curve turns back within a triangle of the proxy, the same triangles are left of one part and right of the
-//! other, and tracing by sides fails. The triangles at the curve's points are still neighbours or nearly so. Here
+//! Where a curve turns back within a triangle of the proxy, triangles lie to the left of one part of the curve and to the
+//! right of another, and tracing by sides fails. The triangles at the curve's points are still neighbours or nearly so. Here
 //! consecutive ones are joined by the shortest path in the dual graph; a path that returns at once through the same
 //! edge is shortened. All this is local, so the curve stays in its homotopy class.
 

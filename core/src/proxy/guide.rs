@@ -159,6 +159,7 @@ impl Guide {
         self.difference(a, b).abs() < 3.0 || position(a).distance(position(b)) < 0.5 * self.reach
     }
 
+    /// Length, in units of the mesh.
     pub fn length(&self) -> f64 {
         self.segments.iter().map(Segment::length).sum()
     }

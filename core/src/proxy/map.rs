@@ -37,7 +37,7 @@ impl Proxy {
         &self.mesh
     }
 
-    /// For each edge of the proxy whether it is a feature, like the edges of the original that it stands for.
+    /// For each edge of the proxy whether it replaces feature edges of the original.
     pub fn sharp(&self) -> &[bool] {
         &self.sharp
     }

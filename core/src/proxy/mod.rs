@@ -1,4 +1,4 @@
-//! A simplified mesh that stands in for a large one (a proxy), with a map between both.
+//! A simplified mesh in place of a large one (a proxy), with a map between both.
 //!
 //! Loops are searched, woven and mapped on the proxy; they are shown and embedded on the original. The proxy has the
 //! topology and the features of the original, near-isotropic triangles of even size, and its vertices are vertices of

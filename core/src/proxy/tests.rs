@@ -191,7 +191,7 @@ fn points_return_from_a_round_trip() {
 }
 
 #[test]
-fn on_a_thin_plate_points_stay_on_their_sheet() {
+fn points_of_a_thin_plate_are_mapped_within_their_sheet() {
     // A flat ring of two sheets, a tenth of a proxy edge apart.
     let plate = grid(160, 80, [true, true], |u, v| {
         let r = 0.3 + 0.15 * (TAU * v).cos();
@@ -324,7 +324,7 @@ proptest! {
         }
     }
 
-    /// The image of a point on the proxy, mapped back, is near the point.
+    /// A point mapped to the proxy and back moves by a fraction of an edge at most.
     #[test]
     fn a_point_returns_from_the_proxy(face in 0u32..120 * 48 * 2, u in 0.0f64..1.0, v in 0.0f64..1.0) {
         let (mesh, proxy) = &*TORUS;

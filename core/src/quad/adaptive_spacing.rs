@@ -1,7 +1,7 @@
 //! Adaptive spacing of isolines: denser where quads are far from the surface.
 //!
 //! Isolines that make edges short on average ([`Spacing::curvature_adapted`]) leave a few quads at tips and in hollows
-//! far from the surface, since an isoline extends along a whole chord; and these quads are the visible ones. So the
+//! far from the surface, since an isoline extends along a whole chord. These quads are the most visible ones. So the
 //! refinement is measured, isolines become denser where its edges are farthest from the surface and sparser elsewhere,
 //! and this is repeated. The result is the spacing with the least greatest distance of an edge.
 

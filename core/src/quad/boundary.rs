@@ -15,9 +15,10 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 const CORNER: f64 = 0.6;
 /// Greatest move of a vertex, as a fraction of the way to its neighbour; less than half, since both may move at once.
 const REACH: f64 = 0.45;
-/// Greatest squared distance of a quad mesh vertex from a corner of the boundary to be fixed there.
+/// Greatest squared distance, in squared units of the mesh, of a quad mesh vertex from a corner of the boundary to be fixed
+/// there.
 const AT_CORNER: f64 = 1e-18;
-/// Least length of a boundary edge, so that arc length increases strictly.
+/// Least length of a boundary edge, in units of the mesh, so that arc length increases strictly.
 const LEAST_EDGE: f64 = 1e-12;
 
 /// The boundary loops of the surface and the places of quad mesh vertices on them.

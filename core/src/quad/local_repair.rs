@@ -30,9 +30,9 @@ const GAIN: f64 = 1e-4;
 /// of a feature a vertex does not move.
 const STRAIGHT: f64 = 0.9;
 
-/// Vertices that may move along features only.
+/// The vertices that may move along features only, and where features are.
 pub struct FeatureConstraint<'a> {
-    /// Whether each vertex lies on a feature; vertices beyond the end are free.
+    /// Whether each vertex lies on a feature; vertices beyond the end of the list are free.
     pub vertices: &'a [bool],
     /// Whether a position on the surface, in this triangle, lies on a feature.
     pub on_feature: &'a (dyn Fn(DVec3, u32) -> bool + 'a),
@@ -92,7 +92,7 @@ struct LocalRepair<'a> {
 }
 
 impl LocalRepair<'_> {
-    /// Moves a vertex to the best position of the first radius with a better one; whether there is one.
+    /// Moves a vertex to the best position of the first radius that has a better one; returns whether a radius has.
     fn improve(&mut self, v: u32) -> bool {
         if self.boundary.is_fixed(v) {
             return false;

@@ -36,7 +36,7 @@ const LEAST_STEP: f64 = 1e-6;
 /// A corner of a quad at a vertex: the quad, and the index of the vertex in it.
 type CornerOf = (u32, u8);
 
-/// The structure of a quad mesh and its side lengths before the optimisation.
+/// The connectivity of a quad mesh and its side lengths before the optimisation.
 pub(super) struct Structure {
     /// The corners at each vertex.
     corners: Vec<Vec<CornerOf>>,
@@ -47,7 +47,7 @@ pub(super) struct Structure {
 }
 
 impl Structure {
-    /// Vertices with `fixed` true never move; those beyond its end are free.
+    /// Vertices with `fixed` true never move; those beyond the end of the list are free.
     pub(super) fn new(mesh: &QuadMesh, fixed: &[bool]) -> Self {
         let n = mesh.positions.len();
         let mut corners = vec![Vec::new(); n];

@@ -11,7 +11,7 @@ pub struct QuadMesh {
     pub quads: Vec<[u32; 4]>,
     /// Layout patch of each quad.
     pub patch: Vec<u32>,
-    /// For each vertex a triangle of the original mesh that contains it.
+    /// For each vertex a triangle of the triangle mesh that contains it.
     pub base_face: Vec<u32>,
     /// Whether each vertex lies on the boundary.
     pub boundary: Vec<bool>,

@@ -195,7 +195,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(12))]
 
         #[test]
-        fn resampling_gives_a_manifold_with_the_requested_counts_and_an_error_that_falls(
+        fn resampling_gives_a_manifold_of_the_requested_size_and_refinement_halves_the_error(
             m in 3u32..10, n in 3u32..10,
         ) {
             let quads = resampled([m, n]);

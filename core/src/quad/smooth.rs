@@ -8,12 +8,13 @@ use super::quality::quality;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
-/// Passes of the optimisation, and rounds in each; after each pass the mesh is kept if it is the best so far.
+/// Passes of the optimisation; after each the mesh is kept if it is the best so far.
 const PASSES: usize = 8;
+/// Rounds of the optimisation in each pass.
 const ROUNDS: usize = 10;
 /// Weight of the initial side lengths in the ideal ones. The given mesh covers the surface evenly; ideal lengths from
-/// the present mesh alone let quads slide off a limb, since chords across it are shorter than the way around. They are
-/// tried where folded quads remain.
+/// the present mesh alone let quads slide off a limb, since chords across it are shorter than those around it. So the
+/// weight 0 is tried only where folded quads remain.
 const INITIAL_WEIGHT: f64 = 0.5;
 
 /// Projects all vertices locally onto `base`, boundary vertices onto the boundary. This is needed where the vertices of

@@ -147,8 +147,8 @@ impl Spacing {
     }
 }
 
-/// The numbers of quads across all chords of an integer-grid map with this `edge` length, and the greatest difference
-/// of a chord's width from its number, in edges.
+/// The numbers of quads across all chords of an integer-grid map with this `edge` length (in units of the maps), and the
+/// greatest difference between a chord's width and its number, in edges.
 pub fn integer_grid_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) -> (Vec<u32>, f64) {
     let mut counts = vec![1; layout.chords];
     let mut error = 0.0f64;
@@ -163,8 +163,8 @@ pub fn integer_grid_counts(layout: &QuadLayout, maps: &[PatchMap], edge: f64) ->
     (counts, error)
 }
 
-/// Directs every arc across its chord such that opposite sides of a patch have the same direction; whether that is the
-/// arc's own direction. On an orientable surface there is such a choice.
+/// Directs every arc across its chord such that opposite sides of a patch have the same direction; returns for each arc
+/// whether that is its own direction. On an orientable surface there is such a choice.
 fn directions(layout: &QuadLayout) -> Vec<bool> {
     let mut across: Vec<Vec<(u32, bool)>> = vec![Vec::new(); layout.arcs.len()];
     for patch in &layout.patches {

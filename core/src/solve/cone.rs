@@ -14,8 +14,8 @@ use crate::progress::{Cancelled, Progress};
 
 /// Most iterations; programs with a solution take 10 to 30.
 const MAX_ITERATIONS: u32 = 100;
-/// Number of constraints from which on cancellation is checked while solving; smaller programs end before anyone could cancel
-/// them.
+/// Number of constraints from which on cancellation is checked while solving; smaller programs end before a user could
+/// cancel them.
 const CANCELLABLE_FROM: usize = 2000;
 /// Time between checks for cancellation.
 const CHECK_INTERVAL: Duration = Duration::from_millis(5);
@@ -92,7 +92,7 @@ impl ConeProgram {
     }
 }
 
-/// An `m` by `n` matrix of its entries.
+/// The `m` by `n` matrix of these entries (row, column, value); entries of equal row and column are summed.
 fn matrix(m: usize, n: usize, entries: impl Iterator<Item = (usize, usize, f64)>) -> CscMatrix<f64> {
     let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for (r, c, v) in entries {

@@ -13,8 +13,8 @@ use thiserror::Error;
 
 /// Coefficients of smaller magnitude count as cancelled; given ones are of the order of 1.
 const ZERO: f64 = 1e-9;
-/// Least magnitude of a pivot relative to the largest coefficient of the constraint; bounds the growth of expressions. At 1 only
-/// the largest coefficients could be pivots, at 0 growth is unbounded.
+/// Least magnitude of a pivot relative to the largest coefficient of the constraint; bounds the growth of expressions. At
+/// 1 only the largest coefficients could be pivots, at 0 growth is unbounded.
 const MIN_PIVOT: f64 = 0.4;
 /// Largest constant of a constraint without variables that counts as satisfied.
 const CONFLICT: f64 = 1e-6;
@@ -27,7 +27,7 @@ pub enum EliminationError {
     Conflict {
         /// Its position in the list.
         constraint: usize,
-        /// What remains of its constant.
+        /// Its residual: the constant that remains when all variables have cancelled.
         rest: f64,
     },
     /// A constraint has an unknown variable or a number that is not finite.
@@ -115,8 +115,8 @@ struct Affine {
     constant: f64,
 }
 
-/// Eliminates `constraints` on as many variables as `keep` has entries. Of the possible pivots the variable with the smallest
-/// `keep` is eliminated first.
+/// Eliminates `constraints`. `keep` has one weight for each variable: of the possible pivots of a constraint, the
+/// variable is eliminated whose weight, together with those of the variables that depend on it, is smallest.
 ///
 /// # Errors
 ///
@@ -150,9 +150,9 @@ pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, 
 
 /// The state between constraints.
 struct Elimination {
-    /// The expressions of eliminated variables; their own variables may be eliminated since.
+    /// The expressions of eliminated variables. The variables in them may have been eliminated since.
     known: Vec<Option<Affine>>,
-    /// `keep`, plus an upper bound of that of all variables that depend on this one.
+    /// Weight of each variable, plus an upper bound of the weights of all variables that depend on it.
     weight: Vec<u64>,
 }
 

@@ -1,6 +1,6 @@
 //! Numerics: sparse Hermitian positive definite systems, elimination of linear equalities, second-order cone programs.
 //!
-//! Nothing here knows meshes. Of this crate the room uses `progress` only.
+//! Nothing here depends on meshes. Of this crate the module uses `progress` only.
 
 mod cone;
 mod eliminate;

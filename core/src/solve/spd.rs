@@ -1,9 +1,9 @@
 //! Sparse Hermitian positive definite systems, real or complex, by Cholesky factorisation (faer).
 //!
-//! A matrix is assembled from triplets of its lower triangle. The symbolic analysis (fill-reducing order, supernodes) is made
-//! once per pattern, the factorisation once per change of values. The residual of every solution is checked; if it is too
-//! large, one step of iterative refinement is made, and if it is still too large, the result is an error. Factorisation runs
-//! on one thread, so that results do not depend on the number of cores.
+//! A matrix is assembled from triplets of its lower triangle. The symbolic analysis (fill-reducing order, supernodes) is
+//! made once per pattern, the factorisation once per change of values. The residual of every solution is checked; if it
+//! is too large, one step of iterative refinement is made, and if it is still too large, the result is an error.
+//! Factorisation runs on one thread, so that results do not depend on the number of cores.
 
 use std::ops::{AddAssign, Mul, Sub};
 use std::sync::Arc;
@@ -22,8 +22,8 @@ use thiserror::Error;
 
 /// Relative residual (maximum norm) above which a solution is refined; chosen by hand.
 const REFINE_ABOVE: f64 = 1e-11;
-/// Relative residual (maximum norm) above which a solution is an error: far above that of well-conditioned systems, far below
-/// a visible error. Chosen by hand.
+/// Relative residual (maximum norm) above which a solution is an error: far above that of well-conditioned systems, far
+/// below a visible error. Chosen by hand.
 const REFUSE_ABOVE: f64 = 1e-5;
 
 /// Why a system could not be solved.
@@ -52,7 +52,7 @@ pub enum SolveError {
     },
 }
 
-/// A field of numbers: real or complex.
+/// The scalars of a linear system: real or complex numbers.
 pub trait Scalar: ComplexField + Copy + AddAssign + Sub<Output = Self> + Mul<Output = Self> {
     /// Zero.
     const ZERO: Self;
@@ -326,7 +326,7 @@ fn max_norm<T: Scalar>(x: &[T]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The Laplacian of a path of `n` nodes, grounded at its first.
+    /// The Laplacian of a path graph of `n` nodes, with a Dirichlet condition at the first.
     fn path(n: u32) -> Vec<(u32, u32, f64)> {
         let mut t = vec![(0, 0, 1.0)];
         for i in 1..n {
@@ -341,7 +341,7 @@ mod tests {
         let mut rhs = vec![0.0; 50];
         rhs[49] = 1.0;
         let x = SpdFactor::new(&m).unwrap().solve(&m, &rhs).unwrap();
-        // Unit flow from the grounded end: the potential rises by one per link.
+        // A unit flow from the fixed end: the potential rises by one per edge.
         for (i, x) in x.iter().enumerate() {
             assert!((x - (i + 1) as f64).abs() < 1e-9);
         }

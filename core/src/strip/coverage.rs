@@ -1,9 +1,9 @@
 //! Strip coverage: which triangles the isolines beside each curve pass.
 //!
-//! On each side of a curve a front takes triangles in the order of their distance `d` from the curve. `d` is the coordinate
-//! that is constant along the curve, continued across cuts. A side ends at the smallest `d` of a singular vertex that the
-//! front reaches. Flipped triangles are not entered; a triangle reached again along the same family of isolines is skipped;
-//! at boundaries the front ends (Campen, Quad Layouts, section 8.2.2).
+//! On each side of a curve a front advances over the triangles in the order of their distance `d` from the curve. `d` is
+//! the coordinate that is constant along the curve, continued across cuts. A side ends at the smallest `d` of a singular
+//! vertex that the front reaches. Flipped triangles are not entered; a triangle reached again along the same family of
+//! isolines is skipped; at boundaries the front ends (Campen, Quad Layouts, section 8.2.2).
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -16,18 +16,20 @@ use crate::surface::Metric;
 /// whose orientation is not reliable where isolines are constraints. Chosen by hand; 0 would stop it at all of them.
 const SLIVER: f64 = 0.05;
 
-/// Singularities of opposite index closer than this, in bounding-box diagonals, do not end a strip: isolines pass such a pair
-/// with a kink only. Chosen by hand.
+/// Singularities of opposite index closer than this, in bounding-box diagonals, do not end a strip: isolines pass such a
+/// pair with a kink only. Chosen by hand.
 const PAIR_DISTANCE: f64 = 0.04;
 
 /// Singularities within this distance of a curve, in bounding-box diagonals, do not end its strip: it would be too narrow to
 /// be seen.
 const MIN_WIDTH: f64 = 0.015;
 
-/// Bound of the length a front may have travelled over the surface, relative to the distance `d` gained, and an addend in
-/// mean edge lengths. The map is nearly isometric, so a front that travels on without gaining distance has been diverted by a
-/// singularity that did not end the strip.
-const MAX_DETOUR: (f64, f64) = (3.0, 2.0);
+/// Largest ratio of the length that a front has travelled over the surface to the distance `d` gained. The map is nearly
+/// isometric, so a front that travels on without gaining distance has been diverted by a singularity that did not end the
+/// strip.
+const MAX_DETOUR: f64 = 3.0;
+/// Length that a front may travel in addition, in mean edge lengths.
+const DETOUR_SLACK: f64 = 2.0;
 
 /// The strip of one curve.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +42,8 @@ pub struct StripCoverage {
     pub faces: usize,
 }
 
-/// A triangle taken by a front: the family of isolines (0: u constant, 1: v constant) and the signed distances of its corners
-/// from the curve.
+/// A triangle taken by a front: the family of isolines (0: u constant, 1: v constant) and the signed distances of its
+/// corners from the curve.
 type Taken = (FaceId, u8, [f64; 3]);
 
 /// The seamless map that fronts advance in.
@@ -87,7 +89,7 @@ pub(super) fn coverage(map: &MapView<'_>, paths: &[EdgePath]) -> Coverage {
 struct Distance {
     branch: i32,
     offset: f64,
-    /// Length over the surface from the curve to the triangle, along the front's way.
+    /// Length over the surface from the curve to the triangle, along the path of the front.
     travelled: f64,
 }
 
@@ -107,11 +109,11 @@ fn component(w: DVec2, branch: i32) -> f64 {
     }
 }
 
-/// What the fronts of all curves share.
+/// The data that the fronts of all curves share.
 struct Fronts<'a> {
     map: &'a MapView<'a>,
     /// The triangles that are not entered.
-    closed: Vec<bool>,
+    blocked: Vec<bool>,
     /// The vertices that end a strip.
     singular: Vec<bool>,
     mean_edge: f64,
@@ -121,12 +123,12 @@ impl<'a> Fronts<'a> {
     fn new(map: &'a MapView<'a>) -> Self {
         let MapView { mesh, metric, .. } = *map;
         let mean = mesh.faces().map(|f| metric.area(f)).sum::<f64>() / mesh.n_faces().max(1) as f64;
-        let closed = mesh.faces().map(|f| map.flipped[f.index()] && metric.area(f) > SLIVER * mean).collect();
+        let blocked = mesh.faces().map(|f| map.flipped[f.index()] && metric.area(f) > SLIVER * mean).collect();
         let mut singular = vec![false; mesh.n_vertices()];
         for s in cancel_opposite_pairs(mesh, &map.field.singularities, PAIR_DISTANCE) {
             singular[s.vertex.index()] = true;
         }
-        Self { map, closed, singular, mean_edge: mesh.mean_edge_length() }
+        Self { map, blocked, singular, mean_edge: mesh.mean_edge_length() }
     }
 
     /// The widths of the strip of a curve on both sides, and its triangles.
@@ -155,7 +157,7 @@ impl<'a> Fronts<'a> {
     fn seed(&self, step: Step, tangent_offset: f64, side: usize) -> Option<(FaceId, Distance)> {
         let MapView { mesh, metric, field, uv, .. } = *self.map;
         let (left, right) = (step.left(mesh), step.right(mesh));
-        // Distances grow along the direction of the cross that lies so many quarter turns to the left of `h`.
+        // Distances increase along the direction of the cross that is `quarters` quarter turns to the left of `h`.
         let across = |h: HalfedgeId, quarters: i32| {
             let f = mesh.face(h);
             let branch = field.branch_along(metric, h, tangent_offset) + quarters;
@@ -185,7 +187,7 @@ impl<'a> Fronts<'a> {
             distances.push(distance);
         }
         let n_seeds = distances.len();
-        let slack = MAX_DETOUR.1 * self.mean_edge;
+        let slack = DETOUR_SLACK * self.mean_edge;
         while let Some((key, (f, at))) = queue.pop() {
             let distance = distances[at];
             if key >= width {
@@ -193,10 +195,10 @@ impl<'a> Fronts<'a> {
             }
             let family = distance.branch.rem_euclid(2) as usize;
             let d = self.map.uv[f.index()].map(|w| distance.at(w));
-            // A front ends that has come around to the other side of its curve, or that has been diverted.
+            // A front ends where it has come around to the other side of its curve, or has been diverted.
             let mean = d.iter().sum::<f64>() / 3.0;
-            let advances = at < n_seeds || (mean > 0.0 && distance.travelled < MAX_DETOUR.0 * mean + slack);
-            if visited[f.index()][family] || self.closed[f.index()] || !advances {
+            let advances = at < n_seeds || (mean > 0.0 && distance.travelled < MAX_DETOUR * mean + slack);
+            if visited[f.index()][family] || self.blocked[f.index()] || !advances {
                 continue;
             }
             visited[f.index()][family] = true;

@@ -1,7 +1,7 @@
 //! Strips: the seamless map with placed curves as isolines, and the triangles each curve's strip covers.
 //!
-//! The strip of a curve (its spine) is the part of the surface that isolines beside the curve pass. The curves lie along mesh
-//! edges. The room uses `mesh`, `surface`, `field`, `param` and `progress`.
+//! The strip of a curve (its spine) is the part of the surface that isolines beside the curve pass. The curves lie along
+//! mesh edges. The module uses `mesh`, `surface`, `field`, `param` and `progress`.
 
 mod coverage;
 mod error;

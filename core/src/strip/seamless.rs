@@ -1,5 +1,5 @@
-//! The seamless map with the curves as exact isolines: one coordinate is constrained to be equal at both ends of each edge of
-//! a curve (Campen, Quad Layouts, section 8.2.2).
+//! The seamless map with the curves as exact isolines: one coordinate is constrained to be equal at both ends of each
+//! edge of a curve (Campen, Quad Layouts, section 8.2.2).
 
 use super::error::StripError;
 use crate::field::{CrossField, EdgePath, Step};
@@ -8,8 +8,8 @@ use crate::param::{CoordinateConstraint, Objective, SeamlessMap, SeamlessSystem}
 use crate::progress::Progress;
 use crate::surface::{Metric, SurfacePoint};
 
-/// Anisotropy of the objective: 1 weights errors of length and of direction equally, so that the map stays close to isometric
-/// and widths are those of the surface.
+/// Anisotropy of the objective: 1 weights errors of length and of direction equally, so that the map stays close to
+/// isometric and widths are those of the surface.
 const ANISOTROPY: f64 = 1.0;
 
 /// The map of the whole mesh.
@@ -27,8 +27,8 @@ pub(super) fn solve(
     Ok(system.solve(metric, field, &objective, progress)?.map)
 }
 
-/// The half-edges left and right of a step, each with the coordinate (0: u, 1: v) to be constant along it: on the left the one
-/// whose isolines are closest to the direction of the curve, on the right its continuation across the edge.
+/// The half-edges left and right of a step, each with the coordinate (0: u, 1: v) to be constant along it: on the left
+/// the one whose isolines are closest to the direction of the curve, on the right its continuation across the edge.
 pub(super) fn constant_coordinates(
     mesh: &TriMesh,
     metric: &Metric,
@@ -53,7 +53,7 @@ fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePa
         weights[h.index() % 3] = 1.0;
         SurfacePoint { face: mesh.face(h), weights }
     };
-    // On one side of the edge only: for the other side the equation follows from the seam's transition.
+    // One equation per edge: that of the other side follows from the transition across the edge.
     let constant = |(&step, &tangent_offset)| constant_coordinates(mesh, metric, field, step, tangent_offset).next();
     let steps = paths.iter().flat_map(|p| p.steps.iter().zip(&p.tangent_offset));
     steps

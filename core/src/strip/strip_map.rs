@@ -25,7 +25,8 @@ pub struct StripMap {
     /// isolines of constant v.
     pub covered: Vec<[Option<u32>; 2]>,
     /// The distance of each corner from the spine of the covering strip, positive on its left, for both families of isolines.
-    /// Continuous within a strip. A point is covered if this is within the widths of the strip; 0 where there is no strip.
+    /// Continuous within a strip, in lengths on the mesh; 0 where there is no strip. A point is covered if its distance is
+    /// within the widths of the strip.
     pub spine_distance: Vec<[[f32; 3]; 2]>,
     /// The largest difference of the constant coordinate between the ends of an edge of a curve, in lengths on the mesh.
     pub residual: f64,

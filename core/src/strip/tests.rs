@@ -45,7 +45,7 @@ fn meridian_and_equator_of_a_torus_are_isolines() {
 }
 
 #[test]
-fn three_great_circles_of_a_sphere() {
+fn strips_of_great_circles_end_at_the_singularities_between_them() {
     let mesh = octasphere(12);
     let mut curves = Vec::new();
     for axis in 0..3 {
@@ -104,7 +104,7 @@ fn spine_distances_vanish_on_the_curve_only() {
 }
 
 #[test]
-fn a_curve_between_the_borders_of_a_ring() {
+fn a_curve_between_two_boundary_loops_is_an_isoline() {
     let mesh = ring(40, 8);
     let mut curves = Vec::new();
     mark(&mesh, &mut curves, 0, |p| p.x > 0.0 && p.y.abs() < 1e-9);
@@ -150,7 +150,7 @@ fn without_curves_there_is_a_map_but_no_strip() {
 
 #[test]
 fn curves_may_cross_themselves_and_coincide_with_cuts() {
-    // The meridian and the outer equator as one curve, and both sides of a cube of which every edge is a curve.
+    // The meridian and the outer equator of a torus as one curve; then the three loops half way around a cube.
     let torus = torus(48, 12);
     let mut curves = Vec::new();
     mark(&torus, &mut curves, 5, |p| p.x > 0.0 && p.y.abs() < 1e-9);
@@ -167,7 +167,7 @@ fn curves_may_cross_themselves_and_coincide_with_cuts() {
     }
     let cube_map = map(&cube, &curves);
     check_seamless(&cube, &cube_map);
-    // The cube is the product of its three loops: the map is an isometry and covers it twice.
+    // The map of the cube is an isometry, and each of its faces is covered by two of the three strips.
     assert!(!cube_map.flipped.contains(&true));
     for s in &cube_map.strips {
         assert!(s.widths.iter().all(|b| (b - 0.1).abs() < 1e-6), "{:?}", s.widths);
@@ -180,7 +180,7 @@ fn curves_may_cross_themselves_and_coincide_with_cuts() {
 }
 
 #[test]
-fn two_components_one_without_curves() {
+fn a_component_without_curves_has_no_strips() {
     let a = cells(&[[0, 0, 0], [3, 0, 0]], 4);
     let mut curves = Vec::new();
     mark(&a, &mut curves, 0, |p| (p.x - 0.1).abs() < 1e-9);
@@ -195,7 +195,7 @@ fn two_components_one_without_curves() {
 }
 
 #[test]
-fn one_thread_and_two_agree_to_the_bit() {
+fn the_result_does_not_depend_on_the_number_of_threads() {
     let sphere = octasphere(8);
     let mut curves = Vec::new();
     for axis in 0..3 {
@@ -209,7 +209,7 @@ fn one_thread_and_two_agree_to_the_bit() {
 }
 
 #[test]
-fn cancelled_work_stops() {
+fn cancellation_and_a_list_of_wrong_length_are_errors() {
     let mesh = octasphere(4);
     let progress = Progress::new();
     progress.cancel();

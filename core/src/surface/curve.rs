@@ -62,12 +62,14 @@ pub enum CurveError {
         crossing: usize,
     },
     /// An inner crossing is on the boundary, or an end of an open curve is not.
-    #[error("crossing {crossing} is on the boundary but no end of an open curve, or an end but not on the boundary")]
+    #[error(
+        "crossing {crossing} is on the boundary but is not an end of an open curve, or is an end but not on the boundary"
+    )]
     Boundary {
         /// Position in the list of crossings.
         crossing: usize,
     },
-    /// A closed curve has at least 3 crossings, an open one 2.
+    /// Fewer crossings than a curve needs: a closed one has at least 3, an open one 2.
     #[error("the curve has only {count} crossings")]
     TooShort {
         /// Number of crossings.

@@ -35,7 +35,7 @@ pub fn geodesic_in(
         return Some(VertexPath { start, end, crossings: Vec::new() });
     }
     let mut strip = midpoint_strip(mesh, start, end, &allowed)?;
-    // Each pass shortens the path, so the loop ends; the bound is a safeguard against rounding.
+    // Each pass shortens the path, so the loop ends. The bound, far above the passes needed, is a safeguard against rounding.
     let mut passes = 20 * strip.len() + 100;
     loop {
         trim(mesh, start, end, &mut strip);

@@ -40,9 +40,9 @@ impl SurfaceIndex {
         Self { bvh, corners }
     }
 
-    /// The first point of the surface on a ray, on either side of the surface, and its distance from `origin`.
+    /// The first point of the surface on a ray, hit from either side, and its distance from `origin` in units of the mesh.
     ///
-    /// `direction` may have any length but zero. `None` if the ray misses the surface.
+    /// `direction` need not have unit length. `None` if the ray misses the surface or `direction` is zero.
     pub fn ray(&self, origin: DVec3, direction: DVec3) -> Option<(SurfacePoint, f64)> {
         let ray = Ray::new(origin, direction)?;
         let mut best: Option<(SurfacePoint, f64)> = None;

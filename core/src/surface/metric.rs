@@ -56,7 +56,7 @@ impl Metric {
         self.direction[h.index()]
     }
 
-    /// The length of a half-edge.
+    /// The length of a half-edge, in units of the mesh.
     #[inline]
     pub fn length(&self, h: HalfedgeId) -> f64 {
         side(&self.layout[h.index() / 3], h.index() % 3).length()
@@ -77,8 +77,8 @@ impl Metric {
         side(corners, i).angle_to(-side(corners, (i + 2) % 3))
     }
 
-    /// The angle to add to a direction in the triangle of `h` for the same direction in the triangle of its twin,
-    /// unfolded.
+    /// The angle, in radians, that added to a direction in the triangle of `h` gives the same direction in the triangle of
+    /// its twin, unfolded.
     #[inline]
     pub fn transport(&self, h: HalfedgeId, twin: HalfedgeId) -> f64 {
         self.direction(twin) + PI - self.direction(h)

@@ -44,7 +44,7 @@ fn rotated(c: &PrincipalCurvature, normal: DVec3) -> DMat3 {
     outer(a) * c.k_min + outer(b) * c.k_max
 }
 
-/// Principal curvatures of a shape operator in the plane with normal `n`; in any plane where the triangle has none.
+/// Principal curvatures of a shape operator in the plane with normal `n`; in an arbitrary plane if `n` is zero.
 fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
     let n = if n == DVec3::ZERO { DVec3::Z } else { n };
     let eigen = plane_eigen(tensor, n);

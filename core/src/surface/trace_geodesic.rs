@@ -21,7 +21,7 @@ const CORNER_CLEARANCE: f64 = 1e-6;
 pub struct PolarMap {
     /// The outgoing half-edges, counter-clockwise, each with its polar angle in radians; the first is at 0.
     pub spokes: Vec<(HalfedgeId, f64)>,
-    /// Polar angle per angle on the surface.
+    /// Ratio of polar angles to angles on the surface.
     pub scale: f64,
     /// The polar angle at which the last triangle ends: 2π, or π at the boundary.
     pub total: f64,
@@ -102,7 +102,7 @@ pub fn trace_geodesic(mesh: &TriMesh, metric: &Metric, v: VertexId, angle: f64, 
         let Some((side, s, t)) = exit else {
             return GeodesicTrace { end: surface_point(metric, face, at), crossed, first, hit_boundary: true };
         };
-        // The second condition is a safeguard: rounding must not keep the loop going.
+        // The second condition is a safeguard against an endless loop by rounding.
         if s >= remaining || crossed.len() > mesh.n_faces() {
             return GeodesicTrace {
                 end: surface_point(metric, face, at + remaining * direction),

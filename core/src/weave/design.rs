@@ -14,13 +14,13 @@ use crate::weave::options::Options;
 #[serde(transparent)]
 pub struct StripId(pub u32);
 
-/// Elastic energy of a loop: its length plus weighted squared curvature (8.2), without alignment. Relaxation lowers it within
-/// a tube around the loop found; alignment only steered the search.
+/// Elastic energy of a loop: its length plus weighted squared curvature (8.2), without alignment. Relaxation lowers it
+/// within a tube around the loop found; alignment only steered the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ElasticEnergy {
-    /// Of the loop as found, in steps of the graph.
+    /// Energy of the loop as found in the elastica graph.
     pub found: f64,
-    /// Of the relaxed curve on the surface; equal to `found` until it is relaxed.
+    /// Energy of the relaxed curve on the surface; equal to `found` until the loop is relaxed.
     #[serde(rename = "now")]
     pub relaxed: f64,
 }
@@ -70,7 +70,7 @@ pub enum DesignError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a design.
@@ -78,10 +78,10 @@ pub enum DesignError {
     Format {
         /// The file.
         path: PathBuf,
-        /// Where and why.
+        /// The error of the parser, with line and column.
         source: serde_json::Error,
     },
-    /// Written by a newer program.
+    /// The design was written by a newer version of the program.
     #[error("the design has format version {0}; this program reads up to {VERSION}")]
     Version(u32),
     /// The mesh is not the one that the design was made on.
@@ -143,7 +143,7 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// What the system says.
+    /// [`DesignError::File`].
     pub fn write(&self, path: &Path) -> Result<(), DesignError> {
         let file = |source| DesignError::File { path: path.to_owned(), source };
         let text =

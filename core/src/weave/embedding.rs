@@ -18,11 +18,11 @@ use crate::weave::woven::red_regions;
 /// A layout with its initial embedding.
 #[derive(Debug, Clone)]
 pub struct InitialLayout {
-    /// Its structure.
+    /// Its structure: nodes, arcs and patches.
     pub layout: QuadLayout,
     /// Its nodes and arcs on the surface.
     pub embedding: Embedding,
-    /// The mesh that they are on.
+    /// The mesh that it is embedded on.
     pub mesh_role: MeshRole,
 }
 
@@ -104,7 +104,7 @@ fn initial_layout_on_design(session: &Session, progress: &Progress) -> Result<Op
     Ok(Some(InitialLayout { layout, embedding, mesh_role: MeshRole::Design }))
 }
 
-/// A mesh with what places nodes on it.
+/// A mesh with the data by which nodes are placed on it.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::weave) struct Place<'a> {
     pub mesh: &'a TriMesh,
@@ -131,8 +131,9 @@ pub(in crate::weave) fn embedded_dual(
     Ok((layout, embedding))
 }
 
-/// An arrangement on the design mesh with the same regions as the one on the proxy, if there is one: of the strips' curves on
-/// the design mesh, or else of their edge paths in the arrangement on the proxy, transferred to the design mesh.
+/// An arrangement on the design mesh with the same regions as the one on the proxy, if there is one: of the strips'
+/// curves on the design mesh, or else of their edge paths in the arrangement on the proxy, transferred to the design
+/// mesh.
 fn arranged_on_design(session: &Session, progress: &Progress) -> Result<Option<Arrangement>, WeaveError> {
     let (mesh, woven) = (&session.model().loaded.mesh, &session.woven().arrangement);
     let same = |mut curves: Vec<SurfaceCurve>| {
@@ -207,7 +208,7 @@ fn feature_corners(mesh: &TriMesh, sharp: &[bool]) -> Vec<bool> {
     degree.into_iter().map(|d| d > 2).collect()
 }
 
-/// Pins are identified by the initial embedding: none of these methods works on an optimised one.
+/// Pins are identified by points of the initial embedding, so none of these methods works on an optimised one.
 impl InitialLayout {
     /// The pin of a node.
     pub fn node_pin(&self, node: usize) -> Option<Pin> {

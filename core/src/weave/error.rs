@@ -65,7 +65,7 @@ pub enum WeaveError {
     /// No strip can be suggested.
     #[error(transparent)]
     NoSuggestion(#[from] NoSuggestion),
-    /// The strips have another layout on the woven mesh of other options.
+    /// Under other options the strips have another layout on the woven mesh.
     #[error("the placed strips have another layout at this level of detail; remove strips on small relief first")]
     Options,
     /// There is no such strip.
@@ -76,7 +76,7 @@ pub enum WeaveError {
     Write {
         /// The file.
         path: std::path::PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
@@ -85,10 +85,10 @@ pub enum WeaveError {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NoSuggestion {
     /// The goal is reached.
-    #[error("nothing is left to do")]
+    #[error("no region needs another strip")]
     Done,
     /// No candidate improves any region that needs strips.
-    #[error("no strip was found that helps with region {region} ({reason})")]
+    #[error("no strip was found that resolves the problem of region {region} ({reason})")]
     NoHelp {
         /// The most urgent region.
         region: u32,

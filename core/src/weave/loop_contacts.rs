@@ -1,4 +1,4 @@
-//! How often a loop crosses placed strips and features.
+//! Counts of the crossings of a loop with placed strips and features.
 //!
 //! Relaxation moves a loop within a tube regardless of features and strips there. A loop beside one of them may then cross
 //! it and return, which adds a strip across a corner or a two-sided patch. Comparing the crossings before and after detects
@@ -11,14 +11,14 @@ use crate::surface::{Crossing, SurfaceCurve};
 
 /// The part of a curve in a triangle: where it enters and leaves on the border, as the number of the side, 0 to 2, plus the
 /// fraction along it.
-type Chord = [f64; 2];
+type TriangleSegment = [f64; 2];
 
 /// Placed strips and features of a mesh.
 pub(in crate::weave) struct LoopContacts<'a> {
     mesh: &'a TriMesh,
     sharp: &'a [bool],
-    /// For each triangle the chords of placed strips in it, each with the number of its strip.
-    chords: HashMap<FaceId, Vec<(u32, Chord)>>,
+    /// For each triangle the segments of placed strips in it, each with the number of its strip.
+    segments: HashMap<FaceId, Vec<(u32, TriangleSegment)>>,
     n_strips: usize,
 }
 
@@ -35,10 +35,10 @@ impl<'a> LoopContacts<'a> {
         sharp: &'a [bool],
         placed: impl IntoIterator<Item = &'s SurfaceCurve>,
     ) -> Self {
-        let mut contacts = Self { mesh, sharp, chords: HashMap::new(), n_strips: 0 };
+        let mut contacts = Self { mesh, sharp, segments: HashMap::new(), n_strips: 0 };
         for (i, curve) in (0..).zip(placed) {
-            for (face, chord) in chords(mesh, curve) {
-                contacts.chords.entry(face).or_default().push((i, chord));
+            for (face, segment) in segments(mesh, curve) {
+                contacts.segments.entry(face).or_default().push((i, segment));
             }
             contacts.n_strips += 1;
         }
@@ -48,9 +48,9 @@ impl<'a> LoopContacts<'a> {
     /// How often a curve crosses each strip and the features.
     pub(in crate::weave) fn count(&self, curve: &SurfaceCurve) -> ContactCounts {
         let mut strips = vec![0; self.n_strips];
-        for (face, chord) in chords(self.mesh, curve) {
-            for &(i, other) in self.chords.get(&face).into_iter().flatten() {
-                strips[i as usize] += u32::from(interleave(chord, other));
+        for (face, segment) in segments(self.mesh, curve) {
+            for &(i, other) in self.segments.get(&face).into_iter().flatten() {
+                strips[i as usize] += u32::from(interleave(segment, other));
             }
         }
         let sharp = |c: &&Crossing| self.sharp[self.mesh.edge(c.halfedge).index()];
@@ -59,14 +59,14 @@ impl<'a> LoopContacts<'a> {
 }
 
 impl ContactCounts {
-    /// Whether no strip, and features in all, are crossed more often than in `before`.
+    /// Whether neither any strip nor the features together are crossed more often than in `before`.
     pub(in crate::weave) fn at_most(&self, before: &Self) -> bool {
         self.features <= before.features && self.strips.iter().zip(&before.strips).all(|(now, then)| now <= then)
     }
 }
 
-/// The chords of a curve, each with its triangle.
-fn chords<'c>(mesh: &'c TriMesh, curve: &'c SurfaceCurve) -> impl Iterator<Item = (FaceId, Chord)> + 'c {
+/// The segments of a curve, each with its triangle.
+fn segments<'c>(mesh: &'c TriMesh, curve: &'c SurfaceCurve) -> impl Iterator<Item = (FaceId, TriangleSegment)> + 'c {
     let n = curve.crossings.len();
     (usize::from(!curve.closed)..n).filter_map(move |i| {
         let (from, to) = (curve.crossings[(i + n - 1) % n], curve.crossings[i]);
@@ -85,8 +85,8 @@ fn border_parameter(c: Crossing) -> f64 {
     (c.halfedge.index() % 3) as f64 + c.t
 }
 
-/// Whether two chords of a triangle cross: exactly one end of one chord lies between the ends of the other.
-fn interleave([a, b]: Chord, [c, d]: Chord) -> bool {
+/// Whether two segments of a triangle cross: exactly one end of one segment lies between the ends of the other.
+fn interleave([a, b]: TriangleSegment, [c, d]: TriangleSegment) -> bool {
     let between = |x: f64| (a.min(b) < x) && (x < a.max(b));
     between(c) != between(d)
 }

@@ -68,7 +68,7 @@ impl Model {
         let Some(proxy) = &self.proxy else { return curve.points(&self.mesh) };
         let original = &self.loaded.mesh;
         match proxy.curve_to_original(original, curve) {
-            Ok(carried) => carried.points(original),
+            Ok(transferred) => transferred.points(original),
             // The curve may have no counterpart, but each of its points has.
             Err(_) => {
                 let point = |i| proxy.to_original(original, curve.surface_point(&self.mesh, i)).position(original);
@@ -78,7 +78,7 @@ impl Model {
     }
 }
 
-/// A side of a region independently of the mesh: its kind (segment, ring, boundary) and its curve.
+/// A side of a region, described independently of the mesh: its kind (segment, ring, boundary) and its curve.
 type SideLabel = (u8, u32);
 
 /// Whether two arrangements of the same curves on two meshes have equally many crossings and the same regions: the same

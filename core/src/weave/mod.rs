@@ -2,7 +2,7 @@
 //!
 //! A [`Model`] is a mesh prepared once. A [`Design`] is the document, a plain value with the placed strips. A [`Session`]
 //! holds a model, a design and its history, together with the arrangement of the strips ([`Woven`]). Searches for strips
-//! are in `search`, what is written in `export`, what only a window shows in `preview`.
+//! are in `search`, the files of a result in `export`, data that only a window shows in `preview`.
 
 mod design;
 mod embedding;

@@ -33,7 +33,7 @@ pub struct OpenedLayout {
 }
 
 impl OpenedLayout {
-    /// Reads a layout file and its mesh, and embeds the layout on the mesh as the file says.
+    /// Reads a layout file and its mesh, and embeds the layout on the mesh by the positions in the file.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl OpenedLayout {
     }
 
     /// Embeds the layout and writes `layout.layout` (the layout as it was given, without collapsed chords), the meshes and
-    /// `report.json`. The inner result is the layout, or why there is none.
+    /// `report.json`. The inner result is the exported layout, or the reason why there is none.
     ///
     /// # Errors
     ///

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::SHARP_DIHEDRAL;
 
-/// What the designer may set.
+/// The settings of a design.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Options {
@@ -15,7 +15,7 @@ pub struct Options {
     pub sharp_dihedral: f64,
     /// Whether strips end at right angles on the boundary.
     pub aligned_boundary: bool,
-    /// Number of triangles of the proxy. Meshes of more than twice as many are woven on one; 0: no mesh is.
+    /// Number of triangles of the proxy. A mesh of more than twice as many is woven on a proxy; 0: none is.
     #[serde(skip_serializing_if = "is_default_proxy")]
     pub proxy: u32,
     /// Radius over which the surface is smoothed for weaving, as a fraction of the bounding-box diagonal; strips ignore

@@ -46,7 +46,7 @@ impl Proposal {
 const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
 /// A found loop relaxed to a smooth curve through `at` that crosses no feature and no placed strip more often than the loop
-/// does. Where that fails in every tube, the loop as it was found.
+/// does. If that fails in every tube, the loop as it was found.
 pub(in crate::weave) fn smoothed_proposal(
     graph: &ElasticaGraph,
     contacts: &LoopContacts<'_>,

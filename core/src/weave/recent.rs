@@ -1,4 +1,4 @@
-//! A cache of the proposals at the last vertices that were pointed at.
+//! A cache of the proposals at the vertices under the latest positions of the pointer.
 //!
 //! A moving pointer stays near a vertex for some steps and returns to it. Proposals at a vertex are valid as long as the
 //! strips are the same. A cancelled search keeps the best loop that it had proved.
@@ -18,7 +18,8 @@ const CAPACITY: usize = 16;
 #[derive(Debug, Default)]
 pub(in crate::weave) struct RecentSearches {
     pub(in crate::weave) workspace: SearchWorkspace,
-    /// Of searches that keep clear of spines only. Separate, because their preparation depends on the mask.
+    /// Workspace of searches that avoid the directions of spines only. It is separate because the preparation of a search
+    /// depends on the mask.
     spine_workspace: SearchWorkspace,
     /// The strips that the cache is valid for.
     woven: Option<Arc<Woven>>,
@@ -97,7 +98,7 @@ impl RecentSearches {
             Ok(found.loops)
         };
         let loops = searched(&woven.mask, &mut self.workspace)?;
-        // Where strips cover every direction, loops keep clear of their spines only.
+        // Where strips cover every direction, loops avoid the directions of their spines only.
         if loops.is_empty() { searched(&woven.spine_mask, &mut self.spine_workspace) } else { Ok(loops) }
     }
 }

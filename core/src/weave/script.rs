@@ -1,8 +1,8 @@
 //! Weave scripts: steps of a designer in a file, replayed without a window.
 //!
-//! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`.
-//! Points are in coordinates of the mesh file and snap to the nearest point of the surface. In place of a mesh there may be a
-//! saved design, which the script continues.
+//! `{"mesh": "path or built-in name", "steps": [{"hover": [x, y, z]}, {"browse": 1}, {"place": true}]}`. Points are in
+//! coordinates of the mesh file and snap to the nearest point of the surface. In place of a mesh there may be a saved
+//! design, which the script continues.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -27,13 +27,13 @@ use crate::weave::session::Session;
 pub enum Step {
     /// Point at the surface: proposals through the nearest point of the surface, the cheapest first.
     Hover([f64; 3]),
-    /// Turn the wheel: by so many proposals forward, or back if negative, cyclically.
+    /// Turn the wheel: this many proposals forward, or back if negative, cyclically.
     Browse(i64),
     /// Click: place the current proposal. `false` does nothing.
     Place(bool),
     /// Press "Suggest" and place the suggestion; does nothing when the goal is reached. `false` does nothing.
     Suggest(bool),
-    /// Press "Improve", with so many rounds at most.
+    /// Press "Improve", with at most this many rounds.
     Improve(usize),
     /// Remove the `n`-th of the present strips in the order placed, from 0.
     Delete(usize),
@@ -64,7 +64,7 @@ pub enum ScriptError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a script.
@@ -72,7 +72,7 @@ pub enum ScriptError {
     Format {
         /// The file.
         path: PathBuf,
-        /// Where and why.
+        /// The error of the parser, with line and column.
         source: serde_json::Error,
     },
     /// The mesh could not be read.
@@ -174,7 +174,7 @@ impl Shown {
             Step::Hover(at) => {
                 let at = session.model().loaded.units.from_file(DVec3::from(at));
                 if !at.is_finite() {
-                    return Err(StepError::NotApplicable("the point is not finite"));
+                    return Err(StepError::NotApplicable("a coordinate of the point is not a finite number"));
                 }
                 let at = session.model().index.nearest(at);
                 self.proposals = session.proposals(at, progress)?;

@@ -118,7 +118,7 @@ impl Session {
         self.design.mesh = source;
     }
 
-    /// The arrangement of the strips and what follows from it.
+    /// The arrangement of the strips and the data derived from it.
     pub fn woven(&self) -> &Arc<Woven> {
         &self.woven
     }
@@ -132,8 +132,8 @@ impl Session {
         self.proposals_with(at, progress, |_| {})
     }
 
-    /// As [`Self::proposals`]; hands the first loop found to `first` before it is proved to be the best, and the best one,
-    /// smoothed, before its alternatives are found.
+    /// As [`Self::proposals`]; also calls `first` with the first loop found, before it is proved to be the best, and with the
+    /// best one, smoothed, before its alternatives are found.
     ///
     /// # Errors
     ///
@@ -277,7 +277,7 @@ impl Session {
         Ok(())
     }
 
-    /// Returns to a former state with what was derived from it.
+    /// Returns to a former state with the data derived from it.
     pub(in crate::weave) fn restore(&mut self, step: HistoryState, woven: Arc<Woven>) {
         (self.design.strips, self.design.pins, self.woven) = (step.strips, step.pins, woven);
     }

@@ -1,4 +1,4 @@
-//! What follows from the placed strips: their arrangement, the assessment of its regions, the strip map, and the
+//! Data derived from the placed strips: their arrangement, the assessment of its regions, the strip map, and the
 //! directions in which further strips may run.
 
 use std::collections::BTreeMap;
@@ -50,7 +50,7 @@ impl Woven {
         progress.report("Assessing regions", 0.1);
         let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
-        progress.report("Closing directions", 0.95);
+        progress.report("Excluding directions of strips", 0.95);
         let mut spine_mask = DirectionMask::none();
         for strip in strips {
             mask_spine(model, strip, &mut spine_mask);

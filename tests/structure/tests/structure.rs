@@ -37,7 +37,7 @@ fn no_file_or_folder_uses_one_that_uses_it() {
 }
 
 #[test]
-fn functions_fit_on_a_screen() {
+fn functions_have_at_most_60_lines() {
     let mut long = Vec::new();
     for root in crates() {
         let sources = read(&root);
@@ -48,7 +48,7 @@ fn functions_fit_on_a_screen() {
 }
 
 #[test]
-fn files_hold_one_concept() {
+fn files_have_at_most_500_lines() {
     let mut folders: Vec<PathBuf> = ["core", "app/src", "tests"].map(|f| repository().join(f)).into();
     let mut long = Vec::new();
     while let Some(folder) = folders.pop() {

@@ -103,7 +103,7 @@ pub struct EmbedArguments {
     /// Changes of the layout in favour of the quad mesh.
     #[command(flatten)]
     pub refine: RefineArguments,
-    /// Most steps of node positions in each of the two phases. 0: nodes stay where they are.
+    /// Maximum number of steps of the node positions in each of the two phases. 0: nodes stay where they are.
     #[arg(long)]
     pub steps: Option<usize>,
     /// No sizing field: isolines have uniform spacing over the surface.

@@ -16,8 +16,8 @@ pub(super) const EMBEDDED: &str = "embedded";
 /// Places suggested strips until the layout is valid, then embeds it several times.
 pub(super) fn measure(session: &mut Session, arguments: &RunArguments, report: &mut Report) -> anyhow::Result<()> {
     let start = Instant::now();
-    if let Some(stuck) = session.weave_to(Goal::Valid, &Progress::new())? {
-        anyhow::bail!("there is no layout to embed: {stuck}");
+    if let Some(reason) = session.weave_to(Goal::Valid, &Progress::new())? {
+        anyhow::bail!("there is no layout to embed: {reason}");
     }
     report.add_times(GROUP, "woven by suggestions", &[start.elapsed()]);
     // The coarsest quad mesh, since its computation is not measured.

@@ -54,7 +54,7 @@ fn nearest(mesh: &TriMesh, to: DVec3) -> VertexId {
 fn layouts() -> Vec<Vec<(DVec3, i32)>> {
     let corner = |k: i32| DVec3::new((k & 1) as f64 - 0.5, (k & 2) as f64 / 2.0 - 0.5, (k & 4) as f64 / 4.0 - 0.5);
     let cube = (0..8).map(|k| (corner(k), 1)).collect();
-    // A pair more, and two poles of a whole turn each: nothing that a smoothest field would have.
+    // An additional pair, two poles of a whole turn each, and a negative one: no smoothest field has these singularities.
     let pair = (0..8).map(|k| (corner(k), 1)).chain([(DVec3::X, -1), (DVec3::new(0.3, 0.1, 0.0), 1)]).collect();
     vec![cube, pair, vec![(DVec3::Z, 4), (-DVec3::Z, 4)], vec![(DVec3::Z, 12), (-DVec3::X, -4)]]
 }
@@ -88,7 +88,7 @@ fn a_field_has_the_singularities_of_its_jumps() {
 }
 
 #[test]
-fn turning_numbers_of_a_torus() {
+fn a_cycle_around_the_tube_of_a_torus_has_turning_number_zero() {
     let mesh = torus(24, 12);
     let metric = Metric::new(&mesh);
     let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>();
@@ -97,7 +97,7 @@ fn turning_numbers_of_a_torus() {
         ((angle[t.index() / 3] - angle[h.index() / 3] - metric.transport(h, t)) / FRAC_PI_2).round() as i32
     };
     let mut jump: Vec<i32> = inner_edges(&mesh).map(turn).collect();
-    // Around the tube, quad after quad: across the diagonal and the side opposite to where one came from.
+    // Around the tube, quad by quad: across the diagonal, then across the side opposite to the one entered by.
     let cycle: Vec<HalfedgeId> = (0..12u32).flat_map(|j| [HalfedgeId(6 * j + 2), HalfedgeId(6 * j + 4)]).collect();
     assert_eq!(turning_number(&mesh, &metric, &jump, &cycle), Some(0));
     let back: Vec<HalfedgeId> = cycle.iter().rev().map(|&h| mesh.twin(h).unwrap()).collect();

@@ -1,7 +1,7 @@
 //! Readers of mesh files, one per format.
 //!
 //! A reader takes bytes and returns a [`RawMesh`]: the polygons of the file, indices checked, nothing repaired. The format
-//! is recognised by the content, and by the file name only if the content does not tell. Readers do not trust counts in
+//! is recognised by the content, and by the file name only if the content is ambiguous. Readers do not trust counts in
 //! headers: memory grows with the bytes that are there.
 
 mod obj;
@@ -46,7 +46,8 @@ fn check(raw: &RawMesh) -> Result<(), LoadError> {
     if let Some(vertex) = raw.positions.iter().position(|p| !p.is_finite()) {
         return Err(LoadError::NotFinite { vertex: vertex + raw.base });
     }
-    // A polygon of n corners becomes n − 2 triangles of three half-edges each. A quarter leaves room for splits.
+    // A polygon of n corners becomes n − 2 triangles of three half-edges each. A quarter of the range leaves space for
+    // vertices that are split.
     if raw.corners.len() > u32::MAX as usize / 4 || raw.positions.len() > u32::MAX as usize / 4 {
         return Err(LoadError::TooLarge);
     }

@@ -109,7 +109,7 @@ fn read_header(source: &mut Source<'_>) -> Result<(Encoding, Vec<Element>), Load
                 element.properties.push(property);
             }
             [b"end_header"] => break,
-            [word, ..] => return Err(source.error(format!("“{}” is no keyword of the header", show(word)))),
+            [word, ..] => return Err(source.error(format!("“{}” is not a keyword of a PLY header", show(word)))),
         }
     }
     let encoding = encoding.ok_or_else(|| source.error("the header does not name the format"))?;
@@ -160,7 +160,7 @@ fn read_faces(source: &mut Source<'_>, element: &Element, raw: &mut RawMesh) -> 
             let keep = is_corners(property);
             source.property(property, |value| {
                 if keep {
-                    // What is no index is cut to some number here and reported below.
+                    // The cast saturates for a value that is not an index; the error follows below.
                     valid &= value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0;
                     raw.corners.push(value as u32);
                 }
@@ -204,7 +204,7 @@ impl<'a> Source<'a> {
         Some(&rest[..end])
     }
 
-    /// Goes to the next element; in text, to the next line that is not blank.
+    /// Moves to element `i`; in text, to the next line that is not blank.
     fn open_row(&mut self, element: &Element, i: usize) -> Result<(), LoadError> {
         let ended = match self.encoding {
             Encoding::Text => loop {

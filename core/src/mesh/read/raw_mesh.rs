@@ -1,4 +1,4 @@
-//! What a reader returns.
+//! The polygons of a file, as a reader returns them.
 
 use glam::DVec3;
 

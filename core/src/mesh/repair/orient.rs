@@ -1,8 +1,8 @@
 //! Consistent orientation of each component.
 //!
-//! A walk over edges from a component's first triangle finds which triangles are oriented against it; if a triangle is
-//! reached with both orientations, the surface is not orientable. A closed component is oriented so that its volume is
-//! positive, an open one as most of its triangles are.
+//! A traversal across edges from a component's first triangle finds the triangles that are oriented against it. If a
+//! triangle is reached with both orientations, the surface is not orientable. A closed component is oriented so that its
+//! volume is positive, an open one as most of its triangles are.
 
 use glam::DVec3;
 
@@ -27,8 +27,8 @@ impl TriangleSoup {
             let n = component.len();
             let against = component.iter().filter(|&&(_, turned)| turned).count();
             let volume = if boxes[i].is_some() { self.volume(component) } else { 0.0 };
-            // Whether the first triangle is to be reversed: against the majority if the component is open, or may bound a
-            // cavity; else if the volume is negative.
+            // Whether the first triangle is to be reversed. In a component that is open or may bound a cavity the majority of
+            // the triangles decides, in any other the sign of the volume.
             let flip_first = if volume == 0.0 || (volume < 0.0 || against > 0) && is_enclosed(&boxes, i) {
                 2 * against > n
             } else {

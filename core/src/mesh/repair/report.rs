@@ -9,7 +9,7 @@ use crate::mesh::error::{FaceRef, VertexRef};
 pub enum Repair {
     /// Vertices at equal positions were welded, since no two faces shared any.
     Welded {
-        /// By how many vertices there are fewer.
+        /// Number of vertices removed.
         count: usize,
     },
     /// Faces without three different corners were dropped.
@@ -30,12 +30,12 @@ pub enum Repair {
     Reoriented {
         /// How many.
         count: usize,
-        /// The face of the first.
+        /// The polygon of the first.
         first: FaceRef,
     },
     /// A closed component oriented inwards was reversed.
     TurnedOutwards {
-        /// How many triangles it has.
+        /// Number of its triangles.
         count: usize,
         /// Its first face.
         first: FaceRef,
@@ -58,12 +58,12 @@ pub enum Repair {
 
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let one = |count: usize, singular: &str, plural: &str| match count {
+        let counted = |count: usize, singular: &str, plural: &str| match count {
             1 => format!("1 {singular}"),
             n => format!("{n} {plural}"),
         };
-        let faces = |count: usize| one(count, "face", "faces");
-        let vertices = |count: usize| one(count, "vertex", "vertices");
+        let faces = |count: usize| counted(count, "face", "faces");
+        let vertices = |count: usize| counted(count, "vertex", "vertices");
         match self {
             Self::Welded { count } => write!(f, "welded {} at the position of another", vertices(*count)),
             Self::DroppedDegenerateFaces { count, first } => {
@@ -76,11 +76,11 @@ impl fmt::Display for Repair {
                 write!(
                     f,
                     "reversed {} oriented against their neighbours (first: {first})",
-                    one(*count, "triangle", "triangles")
+                    counted(*count, "triangle", "triangles")
                 )
             }
             Self::TurnedOutwards { count, first } => {
-                let triangles = one(*count, "triangle", "triangles");
+                let triangles = counted(*count, "triangle", "triangles");
                 write!(f, "reversed a closed surface of {triangles} that was oriented inwards (first: {first})")
             }
             Self::SplitVertices { count, first } => {

@@ -1,4 +1,4 @@
-//! The triangles under repair, and the repairs that need no walk over the surface.
+//! The triangles under repair, and the repairs that need no traversal of the surface.
 
 use std::collections::HashMap;
 

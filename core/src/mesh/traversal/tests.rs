@@ -1,4 +1,4 @@
-//! Traversals against naive references, on random graphs with many ties.
+//! Traversals compared with simple reference implementations, on random graphs with many ties.
 
 use glam::DVec3;
 use proptest::prelude::*;
@@ -132,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn dilation_adds_the_vertices_so_many_edges_away(seeds in prop::collection::vec(0u32..35, 1..4), rings in 0usize..4) {
+    fn dilation_adds_the_vertices_within_as_many_edges(seeds in prop::collection::vec(0u32..35, 1..4), rings in 0usize..4) {
         let mesh = crate::testing::grid(6, 4, [false, false], |u, v| DVec3::new(u, v, 0.0));
         let mut marked = vec![false; mesh.n_vertices()];
         let mut search: BreadthFirst<VertexId, ()> = BreadthFirst::new(mesh.n_vertices());

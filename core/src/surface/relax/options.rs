@@ -1,4 +1,4 @@
-//! What [`relax`](super::relax) is asked for, and what it returns.
+//! The options, the result and the errors of [`relax`](super::relax).
 
 use glam::DVec3;
 use thiserror::Error;
@@ -11,7 +11,7 @@ use crate::surface::point::SurfacePoint;
 /// Penalty `q` of (8.1): maps a triangle and a unit tangent in it to a number that is not negative.
 pub type Alignment<'a> = dyn Fn(FaceId, DVec3) -> f64 + Sync + 'a;
 
-/// What [`relax`](super::relax) minimises, and how far the curve may move.
+/// The objective of [`relax`](super::relax), and how far the curve may move.
 #[derive(Clone)]
 pub struct RelaxOptions<'a> {
     /// Weight `α` of the alignment in (8.1); 1 in the thesis.
@@ -26,7 +26,7 @@ pub struct RelaxOptions<'a> {
     pub tube: f64,
     /// Crossings stay in `[t_min, 1 − t_min]` of their edges; between 0 and 0.5.
     pub t_min: f64,
-    /// Points that the curve passes, up to a fraction of an edge.
+    /// Points that the curve passes at a distance of at most a fraction of an edge.
     pub waypoints: Vec<SurfacePoint>,
     /// Most rounds of sliding and passing over vertices.
     pub rounds: usize,
@@ -54,7 +54,7 @@ impl Default for RelaxOptions<'_> {
 /// The parts of the cost (8.1) of a curve.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CurveCost {
-    /// Length on the mesh.
+    /// Length on the mesh, in units of the mesh.
     pub length: f64,
     /// Integral of the alignment along the curve.
     pub alignment: f64,
@@ -73,7 +73,7 @@ pub struct Relaxed {
     pub before: CurveCost,
     /// Cost of the relaxed curve.
     pub after: CurveCost,
-    /// Largest distance of a crossing from the original curve.
+    /// Largest distance of a crossing from the original curve, in units of the mesh.
     pub max_displacement: f64,
     /// Number of passes over vertices.
     pub passed: usize,
@@ -84,7 +84,7 @@ pub struct Relaxed {
 /// Why a curve cannot be relaxed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RelaxError {
-    /// The curve is not one on this mesh.
+    /// The curve does not lie on this mesh.
     #[error(transparent)]
     Curve(#[from] CurveError),
     /// `t_min` is not strictly between 0 and 0.5.

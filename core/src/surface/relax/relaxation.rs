@@ -18,7 +18,7 @@ const LAST_STEPS: usize = 30;
 ///
 /// # Errors
 ///
-/// A curve that is not one on `mesh`.
+/// [`CurveError`] if the curve does not lie on `mesh`.
 pub fn curve_cost(mesh: &TriMesh, curve: &SurfaceCurve, options: &RelaxOptions<'_>) -> Result<CurveCost, CurveError> {
     curve.check(mesh)?;
     Ok(strip_cost(mesh, options, &TriangleStrip::new(curve)))
@@ -33,11 +33,11 @@ fn strip_cost(mesh: &TriMesh, options: &RelaxOptions<'_>, strip: &TriangleStrip)
 /// Smooths `curve` towards an elastica, as described in the [module documentation](super).
 ///
 /// The result passes [`SurfaceCurve::check`], is homotopic to `curve` (the ends of an open curve may slide on their
-/// boundary loops) and never costs more.
+/// boundary loops) and has no higher cost.
 ///
 /// # Errors
 ///
-/// A curve that is not one on `mesh`, a `t_min` out of range, or [`Cancelled`](crate::progress::Cancelled).
+/// See [`RelaxError`].
 pub fn relax(
     mesh: &TriMesh,
     curve: &SurfaceCurve,

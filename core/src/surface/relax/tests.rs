@@ -32,7 +32,7 @@ fn a_noisy_ring_of_a_cylinder_becomes_straight() {
     let curve = ring(&mesh, 40, 10, 0.4);
     let result = relaxed(&mesh, &curve, &RelaxOptions::default());
     assert!(result.after.bending < 1e-2 * result.before.bending, "{result:?}");
-    // A straight ring is as long as the polygonal cylinder is round.
+    // A straight ring has the circumference of the polygonal cylinder.
     assert!(result.after.length < 1.002 * 0.5 * std::f64::consts::PI, "{result:?}");
     assert_eq!(homology_numbers(&mesh, &curve, 60), homology_numbers(&mesh, &result.curve, 60));
 }

@@ -14,7 +14,7 @@ use crate::surface::vertex_fan::{Side, spokes_across, spokes_from_boundary, spok
 /// One crossing of a [`TriangleStrip`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct StripCrossing {
-    /// As in [`Crossing`].
+    /// See [`Crossing::halfedge`].
     pub halfedge: HalfedgeId,
     /// Parameter from the right end of the edge (0) to the left end (1).
     pub t: f64,

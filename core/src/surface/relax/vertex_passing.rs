@@ -16,12 +16,12 @@ const LEAST_SWEEP: f64 = 0.5;
 const TRIAL_REACH: usize = 10;
 /// Steps of minimisation in a trial.
 const TRIAL_STEPS: usize = 12;
-/// Steps of minimisation after which a trial ends early if it costs [`HOPELESS`] times as much as the curve without it.
+/// Steps of minimisation after which a trial is abandoned if its cost is [`ABANDON_RATIO`] times that of the curve before.
 const FIRST_TRIAL_STEPS: usize = 6;
 /// See [`FIRST_TRIAL_STEPS`]. The factor is above 1, since a curve that has just passed a vertex costs more at first.
-const HOPELESS: f64 = 2.0;
+const ABANDON_RATIO: f64 = 2.0;
 /// A failed trial is repeated only after the cost around the vertex has changed by this fraction.
-const SAME_TRIAL: f64 = 1e-2;
+const RETRY_CHANGE: f64 = 1e-2;
 /// Least decrease of the cost around the vertex, as a fraction, for a trial to succeed; far above rounding.
 const MIN_TRIAL_GAIN: f64 = 1e-5;
 
@@ -81,11 +81,11 @@ impl VertexPassing {
             };
             // The whole strip has just been minimised, so the window needs no steps.
             let here = cost(&mut now, 0);
-            if self.failed.get(&v).is_some_and(|then| (then - here).abs() < SAME_TRIAL * here) {
+            if self.failed.get(&v).is_some_and(|then| (then - here).abs() < RETRY_CHANGE * here) {
                 continue;
             }
             let mut there = cost(&mut other, FIRST_TRIAL_STEPS);
-            if there < here * HOPELESS {
+            if there < here * ABANDON_RATIO {
                 there = cost(&mut other, TRIAL_STEPS);
             }
             if there < here * (1.0 - MIN_TRIAL_GAIN) {

@@ -17,8 +17,8 @@ use crate::surface::{SurfacePoint, nearest_in_triangle};
 use crate::weave::error::WeaveError;
 use crate::weave::export::input::EmbeddingInput;
 
-/// Distance from a sharp edge up to which a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the width
-/// that can be seen.
+/// Distance from a sharp edge up to which a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the
+/// smallest visible width.
 const ON_FEATURE: f64 = 1e-4;
 /// Scaled Jacobian below which a quad releases the fixed vertices around it. Chosen by hand.
 const FLAT: f64 = 0.3;
@@ -80,8 +80,8 @@ fn on_features(quads: &QuadMesh, surface: &Surface<'_>) -> Vec<bool> {
     resolved(&on, &quads.quads)
 }
 
-/// Those vertices on features that belong to a group of [`RESOLVED`] or more, connected by sides of quads. Others lie there by
-/// chance, or on a crease too short for the quads.
+/// Marks the vertices on features that belong to a group of [`RESOLVED`] or more, connected by sides of quads. Others lie on
+/// a feature by chance, or on a crease too short for the quads.
 fn resolved(on: &[bool], quads: &[[u32; 4]]) -> Vec<bool> {
     let mut along = vec![Vec::new(); on.len()];
     for [a, b] in quads.iter().flat_map(|q| (0..4).map(|k| [q[k], q[(k + 1) % 4]])) {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn long_rows_on_features_are_fixed_and_short_ones_and_single_vertices_are_not() {
+    fn only_long_rows_of_vertices_on_features_are_fixed() {
         let mesh = grid(10);
         let mut on = vec![false; 100];
         (0..10).for_each(|k| on[30 + k] = true);

@@ -1,7 +1,7 @@
 //! From a layout with its initial embedding to quads: optimised, mapped patch by patch, refined.
 //!
-//! If the optimisation fails or does not lower the distortion, the initial embedding takes its place, with harmonic patch
-//! maps, and the result says why.
+//! If the optimisation fails or does not lower the distortion, the initial embedding with harmonic patch maps is used
+//! instead, and the result contains the reason.
 
 use std::time::Instant;
 
@@ -85,7 +85,7 @@ struct MappedLayout {
     layout: QuadLayout,
     embedding: Embedding,
     maps: Vec<PatchMap>,
-    /// The report of the optimisation, or why the initial embedding was chosen.
+    /// The report of the optimisation, or why the initial embedding was chosen; `None` without an optimisation.
     optimised: Option<Result<EmbeddingReport, String>>,
     initial: InitialState,
 }

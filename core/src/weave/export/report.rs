@@ -1,4 +1,4 @@
-//! `report.json`: what was woven, which layout it has, how good its embedding is.
+//! `report.json`: the strips, the layout, and the quality of its embedding.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -18,7 +18,7 @@ use crate::weave::export::result::{Export, Times};
 use crate::weave::mesh_role::MeshRole;
 use crate::weave::session::Session;
 
-/// What a report is about.
+/// The subject of a report.
 #[derive(Clone, Copy)]
 pub(in crate::weave) enum Subject<'a> {
     /// A session with its design.
@@ -121,7 +121,7 @@ struct EmbeddingSection {
     patches: Vec<PatchSection>,
 }
 
-/// The course of the optimisation. Lengths and positions are in units of the file.
+/// Results of the optimisation. Lengths and positions are in units of the file.
 #[derive(Serialize)]
 struct OptimisationSection {
     steps: usize,
@@ -132,7 +132,7 @@ struct OptimisationSection {
     remaining_flipped_triangles: Vec<FlippedTriangle>,
     /// Chords that were collapsed, in order.
     collapsed_chords: Vec<CollapsedChord>,
-    /// Chords that are shorter than asked for and could not be collapsed.
+    /// Chords that are shorter than the requested length and could not be collapsed.
     uncollapsed_chords: Vec<UncollapsedChord>,
     feature_edges: FeatureEdgesSection,
 }
@@ -190,7 +190,7 @@ struct Checks {
     no_folded_quads: bool,
 }
 
-/// Writes `report.json` of a layout on `mesh`, or of why there is none.
+/// Writes `report.json` with the layout on `mesh`, or with the reason why there is none.
 pub(in crate::weave) fn write_report(
     folder: &Path,
     subject: Subject<'_>,

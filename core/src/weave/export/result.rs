@@ -8,7 +8,7 @@ use crate::quad::QuadMesh;
 use crate::surface::{PrincipalCurvature, face_curvature};
 use crate::weave::mesh_role::MeshRole;
 
-/// Seconds by the name of the work.
+/// Durations in seconds, by the name of the work.
 pub type Times = BTreeMap<String, f64>;
 
 /// The embedding that an optimisation started with.
@@ -42,13 +42,13 @@ pub struct Export {
     pub mesh_role: MeshRole,
     /// The maps of its patches.
     pub maps: Vec<PatchMap>,
-    /// Its refinement.
+    /// The quad mesh that refines it.
     pub quads: QuadMesh,
-    /// The report of the optimisation, or why it failed; `None` if none was asked for.
+    /// The report of the optimisation, or why it failed; `None` without an optimisation.
     pub optimised: Option<Result<EmbeddingReport, String>>,
     /// The embedding before the optimisation.
     pub initial: InitialState,
-    /// Seconds that parts of the work took.
+    /// Durations of the parts of the work.
     pub seconds: Times,
 }
 

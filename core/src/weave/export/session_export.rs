@@ -56,9 +56,9 @@ pub(in crate::weave) fn export_layout(
 }
 
 /// Writes `design.plait` and `report.json`, and for a valid layout its meshes and, unless it is embedded on a proxy,
-/// `layout.layout`. The inner result is the layout, or why there is none.
+/// `layout.layout`. The inner result is the exported layout, or the reason why there is none.
 ///
-/// `optimised` is the optimised embedding, if there is one already. `seconds` are added to the times of the report.
+/// `optimised` is the optimised embedding, if there is one already. `seconds` are added to the durations of the report.
 ///
 /// # Errors
 ///

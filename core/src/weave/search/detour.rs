@@ -13,7 +13,8 @@ use crate::surface::{Crossing, SurfaceCurve};
 use crate::union_find::UnionFind;
 use crate::weave::proposal::Proposal;
 
-/// Cost of crossing a placed curve, as a length on a surface of diagonal 1: shorter detours avoid a crossing. Chosen by hand.
+/// Cost of crossing a placed curve, as a length on a surface of diagonal 1: shorter detours avoid a crossing. Chosen by
+/// hand.
 const CROSSING_COST: f64 = 0.05;
 
 /// The shortest curve of each class through the triangle `root` of the arrangement, the shortest first, at most `max`.
@@ -150,8 +151,8 @@ impl Tree {
         hash
     }
 
-    /// The half-edges that a curve crosses, each in the triangle that is left. The path from the root that both parts of the
-    /// curve share is left out.
+    /// The half-edges that a curve crosses, each in the triangle that the curve leaves. The path from the root that both parts
+    /// of the curve share is left out.
     fn walk(&self, arrangement: &Arrangement, closing: Closing) -> Vec<u32> {
         let refined = &arrangement.refined;
         let path_to = |mut f: u32| {
@@ -235,7 +236,8 @@ fn boundary_class(arrangement: &Arrangement, h: u32) -> u64 {
     }
 }
 
-/// The finaliser of SplitMix64, a hash of 64 bits.
+/// The finaliser of SplitMix64, a hash of 64 bits. Callers add different offsets to their numbers, so that segments,
+/// edges, curve ends and boundary loops have different arguments.
 fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

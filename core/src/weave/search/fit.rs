@@ -38,13 +38,13 @@ pub struct Fit {
     pub patches: usize,
     /// Number of irregular nodes.
     pub irregular: usize,
-    /// The objective of improving, in degrees: the weighted sum of deviation, distortion and structure. The less, the
+    /// The objective of improving, in degrees: the weighted sum of deviation, distortion and structure. Lower is
     /// better.
     pub objective: f64,
 }
 
-/// The predicted fit of the layout of curves on the woven mesh, after so many steps of its nodes, and the contribution of each
-/// triangle to the deviation.
+/// The predicted fit of the layout of curves on the woven mesh, after `steps` steps of its nodes, and the contribution of
+/// each triangle to the deviation.
 ///
 /// # Errors
 ///

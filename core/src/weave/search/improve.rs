@@ -35,8 +35,8 @@ const COARSEST: u32 = 6000;
 const LEAST_SIMPLIFICATION: usize = 2;
 /// Factor between the sizes of the proxies tried in turn, until the strips have the same arrangement on one. Chosen by hand.
 const REFINEMENT: u32 = 2;
-/// By how much the objective may rise in the first round, in degrees: about what a strip costs that has no use yet. It
-/// decreases to zero quadratically.
+/// By how much the objective may rise in the first round, in degrees: about the contribution of a strip that does not
+/// improve the layout yet. It decreases to zero quadratically.
 const TOLERANCE: f64 = 0.3;
 /// Radius of the tube in which a strip from a proxy is relaxed on a finer mesh, in mean edge lengths. Larger than for loops,
 /// since edges of the proxy are longer. Chosen by hand.
@@ -49,12 +49,12 @@ pub struct Improvement {
     pub before: Fit,
     /// Fit of the best layout so far.
     pub after: Fit,
-    /// How often a better layout was found.
+    /// Number of times that a better layout was found.
     pub changes: usize,
 }
 
 impl Session {
-    /// Improves the layout, in so many rounds at most. `watch` sees every better layout, with the session that has it, and may
+    /// Improves the layout, in at most `rounds` rounds. `watch` sees every better layout, with the session that has it, and may
     /// stop the search. All changes together are one step of the history.
     ///
     /// # Errors
@@ -132,8 +132,8 @@ impl Session {
         Ok(None)
     }
 
-    /// The strips of a trial as strips of this session, relaxed if they come from another mesh, or as they are if the relaxed
-    /// ones have another arrangement. `None` if these have, too.
+    /// The strips of a trial as strips of this session, relaxed if they come from another mesh. If the relaxed strips have
+    /// another arrangement they are not relaxed; `None` if the arrangement then differs as well.
     fn transferred(&self, trial: &Trial, progress: &Progress) -> Result<Option<Vec<Strip>>, WeaveError> {
         for smooth in [true, false] {
             let strips: Option<Vec<Strip>> = (self.free_id().0..)

@@ -1,4 +1,4 @@
-//! Searches for strips: the suggestion that helps most, and better strips for a valid layout.
+//! Searches for strips: the next strip to suggest, and better strips for a valid layout.
 //!
 //! [`suggest`] takes the candidate that brings the arrangement nearest to its goal. [`improve`] is a local search over the
 //! strips; its moves are in [`trial`], its objective in [`fit`]. Candidates are loops of the elastica graph

@@ -1,4 +1,4 @@
-//! Suggests the strip that helps most.
+//! Suggests the strip that improves the arrangement most.
 //!
 //! Candidates are loops through well-spread points of the most urgent region. Each is tried in the arrangement; the one of
 //! least elastica cost per gain is suggested. The gain is measured by the *deficit* of an arrangement, a weighted count of
@@ -27,7 +27,7 @@ pub enum Goal {
     Separated,
 }
 
-/// Number of points tried in a region: enough that some lie on each of its limbs. Chosen by hand.
+/// Number of points tried in a region: enough for some to lie on each of its limbs. Chosen by hand.
 const POINTS: usize = 10;
 /// Number of candidates tried in the arrangement, the cheapest first. Chosen by hand.
 const TRIED: usize = 32;
@@ -47,7 +47,7 @@ enum Search {
 }
 
 impl Session {
-    /// The strip that helps most now towards `goal`.
+    /// The strip that brings the arrangement nearest to `goal`.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ impl Session {
         Err(NoSuggestion::NoHelp { region: first, reason }.into())
     }
 
-    /// Places suggestions until `goal` is reached. Returns why it is not, if no further strip can be suggested.
+    /// Places suggestions until `goal` is reached. If no further strip can be suggested before, the reason is returned.
     ///
     /// # Errors
     ///
@@ -91,7 +91,7 @@ impl Session {
             match self.suggest(goal, progress) {
                 Ok(proposal) => self.place(proposal, progress)?,
                 Err(WeaveError::NoSuggestion(NoSuggestion::Done)) => return Ok(None),
-                Err(WeaveError::NoSuggestion(stuck)) => return Ok(Some(stuck)),
+                Err(WeaveError::NoSuggestion(reason)) => return Ok(Some(reason)),
                 Err(error) => return Err(error),
             };
         }

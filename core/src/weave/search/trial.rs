@@ -1,10 +1,10 @@
 //! The state and the moves of the search for better strips.
 //!
-//! In each round a vertex is drawn with probability proportional to the local deviation from principal directions. Loops of
-//! the elastica graph and of the alignment graph through it are candidates. Moves add a candidate, replace a strip by one (a
-//! parallel strip or a random one), or remove a strip. Splitting a node often takes two strips that cross there, and nodes of
-//! a knob's own take three, two across its head and one around its neck: so groups of candidates, also through a second
-//! vertex nearby, are added together.
+//! In each round a vertex is drawn with probability proportional to the local deviation from principal directions. Loops
+//! of the elastica graph and of the alignment graph through it are candidates. Moves add a candidate, replace a strip by
+//! one (a parallel strip or a random one), or remove a strip. To split a node, two strips that cross there are often
+//! needed; to give a protrusion nodes of its own, three: two across its top and one around its base. So groups of
+//! candidates, also through a second vertex nearby, are added together.
 
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ use crate::weave::session::Session;
 
 /// Number of candidates from each graph in a round. Chosen by hand.
 const LOOPS: usize = 4;
-/// Number of loops of the elastica graph that candidates are drawn from. The cheapest are short, and longer ones are wanted,
-/// too. Chosen by hand.
+/// Number of loops of the elastica graph that candidates are drawn from. The cheapest are short, but longer ones are
+/// needed as well. Chosen by hand.
 const POOL: usize = 16;
 /// Groups of candidates tried together in a round, as size and number: pairs and triples. Chosen by hand.
 const GROUPS: [(usize, usize); 2] = [(2, 3), (3, 4)];
@@ -132,7 +132,7 @@ impl Trial {
         shortlist.truncate(SHORTLISTED);
         let (changes, initial): (Vec<Change>, Vec<f64>) = shortlist.into_iter().unzip();
         let moved = self.fits(&changes, &candidates, STEPS, progress)?;
-        // A removal alone must not raise the objective: else strips would become fewer and fewer.
+        // A removal alone must not raise the objective; otherwise the number of strips would decrease steadily.
         let most = |c: &Change| self.now.fit.objective + if c.add.is_empty() { 0.0 } else { tolerance };
         let found = changes.into_iter().zip(initial).zip(moved).filter_map(|(pair, found)| Some((pair, found?)));
         let allowed = found.filter(|((change, _), (fit, _))| fit.objective < most(change));
@@ -150,7 +150,7 @@ impl Trial {
         Ok(true)
     }
 
-    /// The fits of the layouts after moves, after so many steps of the nodes.
+    /// The fits of the layouts after each of the moves and `steps` steps of the nodes.
     fn fits(
         &self,
         changes: &[Change],
@@ -226,7 +226,7 @@ impl Trial {
         self.model.mesh.face_vertices(FaceId::new(face))[self.random.below(3)]
     }
 
-    /// Another such vertex within [`NEARBY`] of `v`, if one is drawn.
+    /// Another vertex drawn like [`Self::point`], within [`NEARBY`] of `v`; `None` if none is found in [`DRAWS`] draws.
     fn point_near(&mut self, v: VertexId) -> Option<VertexId> {
         let model = Arc::clone(&self.model);
         let at = |v| model.mesh.position(v);
@@ -296,7 +296,7 @@ impl Random {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Below `n`, or 0 if `n` is 0.
+    /// Uniform in `0..n`; 0 if `n` is 0.
     fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }

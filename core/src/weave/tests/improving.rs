@@ -55,7 +55,7 @@ fn winding_strips_are_replaced_by_aligned_ones() {
     // Fields of both windings are parallel; only the map shows which of them is aligned.
     assert!(found.after.objective < 0.7 * found.before.objective && found.after.alignment < 4.0, "{found:?}");
     assert!(s.woven().red().is_empty() && found.after.irregular == 0);
-    // The prediction comes true.
+    // The optimised embedding has the predicted alignment.
     let export = export(&s, &ExportOptions::default(), &Progress::new()).unwrap();
     assert!(export.measures().alignment < 4.0, "{:?}", export.measures());
 }

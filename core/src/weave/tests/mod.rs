@@ -136,7 +136,7 @@ fn red_regions_are_named_and_prevent_the_export() {
 }
 
 #[test]
-fn detours_cut_regions_that_are_no_discs() {
+fn detours_cut_regions_that_are_not_discs() {
     // On a torus without strips and on one with a single strip some detour does not separate.
     let mut s = session(torus(24, 12));
     for wanted in [0, 1] {
@@ -166,7 +166,7 @@ fn cancelled_work_leaves_the_design_unchanged() {
 }
 
 #[test]
-fn a_design_is_read_as_written_and_only_on_its_mesh() {
+fn a_design_is_read_as_written_and_refused_on_another_mesh() {
     let mut s = session(torus(32, 16));
     place(&mut s, DVec3::new(0.4, 0.0, 0.0));
     let text = serde_json::to_string(s.design()).unwrap();
@@ -180,7 +180,7 @@ fn a_design_is_read_as_written_and_only_on_its_mesh() {
 }
 
 #[test]
-fn scripts_name_the_step_that_fails() {
+fn errors_of_scripts_name_the_step() {
     let script = |steps: &str| -> Script {
         serde_json::from_str(&format!(r#"{{"mesh": "torus", "steps": [{steps}]}}"#)).unwrap()
     };

@@ -12,7 +12,7 @@ program=${1:-$root/target/debug/plait}
 # percent they may be exceeded: compilers and the vector units of the processor make a difference of some percent.
 hover=1180
 strips=816
-embed=1
+embed=5040
 margin=25
 
 if ! command -v valgrind >/dev/null; then

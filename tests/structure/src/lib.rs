@@ -314,19 +314,19 @@ fn name_of(item: &syn::Item) -> Option<String> {
     })
 }
 
-/// One circle of files or folders that lie beside each other, with the uses that close it.
+/// One cycle of files or folders that lie beside each other, with the uses that close it.
 #[derive(Debug)]
-pub struct Circle {
+pub struct Cycle {
     /// Files or folders that lie beside each other.
     pub members: Vec<PathBuf>,
     /// Which file uses what of which, a line each.
     pub uses: Vec<String>,
 }
 
-/// Circles among the files and folders of every folder: all below a folder counts as the folder.
+/// Cycles among the files and folders of every folder: all below a folder counts as the folder.
 ///
-/// A circle of files anywhere is a circle of entries in the lowest folder that holds them all, so none is missed.
-pub fn circles(edges: &Edges) -> Vec<Circle> {
+/// A cycle of files anywhere is a cycle of entries in the lowest folder that holds them all, so none is missed.
+pub fn cycles(edges: &Edges) -> Vec<Cycle> {
     let mut levels: BTreeMap<PathBuf, BTreeMap<(PathBuf, PathBuf), Vec<String>>> = BTreeMap::new();
     for ((from, to), names) in edges {
         let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
@@ -336,10 +336,10 @@ pub fn circles(edges: &Edges) -> Vec<Circle> {
         let pair = (cut(from, shared + 1), cut(to, shared + 1));
         levels.entry(cut(from, shared)).or_default().entry(pair).or_default().push(text);
     }
-    levels.values().flat_map(circles_of).collect()
+    levels.values().flat_map(cycles_of).collect()
 }
 
-fn circles_of(edges: &BTreeMap<(PathBuf, PathBuf), Vec<String>>) -> Vec<Circle> {
+fn cycles_of(edges: &BTreeMap<(PathBuf, PathBuf), Vec<String>>) -> Vec<Cycle> {
     let reached = |from: &PathBuf| {
         let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
         let mut stack = vec![from.clone()];
@@ -355,7 +355,7 @@ fn circles_of(edges: &BTreeMap<(PathBuf, PathBuf), Vec<String>>) -> Vec<Circle> 
     let nodes: BTreeSet<&PathBuf> = edges.keys().flat_map(|(a, b)| [a, b]).collect();
     let reach: BTreeMap<&PathBuf, BTreeSet<PathBuf>> = nodes.iter().map(|n| (*n, reached(n))).collect();
     let mut done: BTreeSet<&PathBuf> = BTreeSet::new();
-    let mut circles = Vec::new();
+    let mut cycles = Vec::new();
     for &node in &nodes {
         if done.contains(node) || !reach[node].contains(node) {
             continue;
@@ -365,7 +365,7 @@ fn circles_of(edges: &BTreeMap<(PathBuf, PathBuf), Vec<String>>) -> Vec<Circle> 
         done.extend(&members);
         let inside = |(a, b): &&(PathBuf, PathBuf)| members.contains(&a) && members.contains(&b);
         let uses = edges.keys().filter(inside).flat_map(|pair| edges[pair].clone()).collect();
-        circles.push(Circle { members: members.into_iter().cloned().collect(), uses });
+        cycles.push(Cycle { members: members.into_iter().cloned().collect(), uses });
     }
-    circles
+    cycles
 }

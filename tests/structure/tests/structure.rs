@@ -1,8 +1,8 @@
-//! The structure of the source: no circles between files or folders, no long functions, no long files.
+//! The structure of the source: no cycles between files or folders, no long functions, no long files.
 
 use std::path::{Path, PathBuf};
 
-use plait_structure::{Circle, circles, read};
+use plait_structure::{Cycle, cycles, read};
 
 /// Most lines of a function: what fits on a screen.
 const FUNCTION: usize = 60;
@@ -17,10 +17,10 @@ fn crates() -> [PathBuf; 2] {
     ["core", "app"].map(|name| repository().join(name).join("src/lib.rs"))
 }
 
-fn listed(found: &[Circle]) -> String {
-    let one = |c: &Circle| {
+fn listed(found: &[Cycle]) -> String {
+    let one = |c: &Cycle| {
         let members: Vec<String> = c.members.iter().map(|m| m.display().to_string()).collect();
-        format!("circle of {}\n    {}", members.join(", "), c.uses.join("\n    "))
+        format!("cycle of {}\n    {}", members.join(", "), c.uses.join("\n    "))
     };
     found.iter().map(one).collect::<Vec<_>>().join("\n")
 }
@@ -31,7 +31,7 @@ fn no_file_or_folder_uses_one_that_uses_it() {
     for root in crates() {
         let sources = read(&root);
         assert!(sources.edges.len() > 50, "{}: hardly any uses were read", root.display());
-        found.extend(circles(&sources.edges));
+        found.extend(cycles(&sources.edges));
     }
     assert!(found.is_empty(), "{}", listed(&found));
 }
@@ -67,19 +67,19 @@ fn files_have_at_most_500_lines() {
     assert!(long.is_empty(), "longer than {FILE} lines: {long:#?}");
 }
 
-/// Writes a crate of some files and returns its circles.
-fn planted(files: &[(&str, &str)]) -> Vec<Circle> {
+/// Writes a crate of some files and returns its cycles.
+fn planted(files: &[(&str, &str)]) -> Vec<Cycle> {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {
         let path = folder.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, text).unwrap();
     }
-    circles(&read(&folder.path().join("lib.rs")).edges)
+    cycles(&read(&folder.path().join("lib.rs")).edges)
 }
 
 #[test]
-fn a_planted_circle_is_found_however_it_is_written() {
+fn a_planted_cycle_is_found_however_it_is_written() {
     let top = ("lib.rs", "mod a;\nmod b;\n");
     let down = ("b.rs", "use crate::a::A;\npub struct B(A);\npub fn b() -> u8 { 0 }\n");
     for (way, text) in [
@@ -98,7 +98,7 @@ fn a_planted_circle_is_found_however_it_is_written() {
 }
 
 #[test]
-fn a_planted_circle_is_found_through_reexports_and_between_folders() {
+fn a_planted_cycle_is_found_through_reexports_and_between_folders() {
     // `high` re-exports what `high/part.rs` defines; `low` uses it by the short name.
     let files = [
         ("lib.rs", "pub mod low;\npub mod high;\n"),

@@ -68,7 +68,7 @@ place() {
 }
 
 open creature
-point 560 480
+point 530 480
 picture hover
 xdotool click 5
 picture alternative
@@ -76,7 +76,7 @@ xdotool click 4
 settle
 xdotool click 1
 settle
-place 780 310
+place 750 310
 picture red
 xdotool mousemove 20 800 key s
 picture three-strips

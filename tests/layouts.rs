@@ -12,7 +12,9 @@ use plait_core::embed::{
     Surface, arc_headings, optimise_embedding,
 };
 use plait_core::field::indices;
-use plait_core::layout::{Arc, DualCurve, Embedding, Node, Patch, QuadLayout, carry, map_patches, redraw};
+use plait_core::layout::{
+    Arc, DualCurve, Embedding, Node, Patch, QuadLayout, map_patches, reembed, transfer_embedding,
+};
 use plait_core::mesh::{HalfedgeId, MeshSource, TriMesh, VertexId};
 use plait_core::progress::Progress;
 use plait_core::proxy::Proxy;
@@ -352,11 +354,17 @@ fn an_embedding_is_transferred_to_a_proxy_and_back() {
     };
     let carried = |line: &DualCurve| proxy.polyline_to_proxy(&prepared.mesh, &line.points, line.closed).ok();
     let own = (&layout, &initial_embedding, prepared.mesh.n_vertices());
-    let coarse = carry(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
+    let coarse = transfer_embedding(own, proxy.mesh(), carried, to, &Progress::new()).unwrap().unwrap();
     check_embedding(&layout, &coarse);
     let carried = |line: &DualCurve| proxy.polyline_to_original(&prepared.mesh, &line.points, line.closed).ok();
     let own = (&layout, &coarse, proxy.mesh().n_vertices());
-    let back = carry(own, &prepared.mesh, carried, |n| Some(VertexId(initial_embedding.nodes[n])), &Progress::new());
+    let back = transfer_embedding(
+        own,
+        &prepared.mesh,
+        carried,
+        |n| Some(VertexId(initial_embedding.nodes[n])),
+        &Progress::new(),
+    );
     let back = back.unwrap().unwrap();
     check_embedding(&layout, &back);
     // Every part has its number again: nodes have their positions, and arcs lie near theirs.
@@ -453,9 +461,9 @@ fn chords_are_removed_that_only_make_a_layout_irregular() {
     assert!(!simpler(&layout));
     let pairs = (0..layout.chords).flat_map(|a| (0..a).map(move |b| (a, b)));
     let mut gone = pairs.map(|(a, b)| (0..layout.chords).map(|c| c == a || c == b).collect::<Vec<bool>>());
-    let gone = gone.find(|gone| layout.without(gone).is_ok_and(|left| simpler(&left.layout))).unwrap();
+    let gone = gone.find(|gone| layout.without_chords(gone).is_ok_and(|left| simpler(&left.layout))).unwrap();
     let left =
-        redraw(&layout, &initial_embedding, &gone, |_| false, prepared.mesh.n_vertices(), &Progress::new()).unwrap();
+        reembed(&layout, &initial_embedding, &gone, |_| false, prepared.mesh.n_vertices(), &Progress::new()).unwrap();
     let settings = Settings { simplify: true, ..Settings::default() };
     let (given, done) = embedded_on(&prepared, left.layout, &left.embedding, settings);
     assert!(done.layout.irregularity() < given.irregularity(), "{:?}", done.report);

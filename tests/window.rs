@@ -274,7 +274,7 @@ fn a_layout_is_improved_watched_stopped_and_kept() {
     window.get_by_label("Improve the layout").click();
     // The strips change while it goes on.
     until(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() > 2));
-    window.get_by_label_contains("Alignment error");
+    window.get_by_label_contains("(before 10.0°)");
     assert!(window.query_by_label("Improve the layout").is_none());
     window.get_by_label("Stop").click();
     wait(&mut window, |app| app.is_idle());

@@ -229,4 +229,11 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn nothing_to_frame_leaves_the_camera() {
+        let mut camera = Camera::default();
+        camera.frame(&[], SIZE);
+        assert_eq!(camera, Camera::default());
+    }
 }

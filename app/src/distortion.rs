@@ -126,4 +126,10 @@ mod tests {
         assert_eq!(ColourMode::Alignment.tints(&summary).unwrap()[0][3], 0);
         assert!(ColourMode::Regions.tints(&summary).is_none());
     }
+
+    #[test]
+    fn distortion_below_the_minimum_is_at_the_start_of_the_scale() {
+        // Rounding can lead below 2, where the ratio of the singular values is not real.
+        assert_eq!((conformal_position(1.999), conformal_position(2.0)), (0.0, 0.0));
+    }
 }

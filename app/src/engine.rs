@@ -400,3 +400,28 @@ pub struct EmbeddingSummary {
     /// Distortion of each triangle of the design mesh.
     pub triangles: Vec<FaceDistortion>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_without_its_folder() {
+        assert_eq!(Source::File("some/folder/bunny.obj".into()).name(), "bunny.obj");
+        assert_eq!(Source::BuiltIn("torus".into()).name(), "torus");
+    }
+
+    #[test]
+    fn pinned_nodes_come_before_pinned_arcs() {
+        let node = |pinned| LayoutNode { position: DVec3::ZERO, valence: 4, irregular: false, pinned };
+        let arc = |pinned| LayoutArc { pinned, ..LayoutArc::default() };
+        let layout = LayoutPreview { arcs: vec![arc(true), arc(false)], nodes: vec![node(false), node(true)] };
+        assert_eq!(layout.pinned(), [LayoutPart::Node(1), LayoutPart::Arc(0)]);
+    }
+
+    #[test]
+    fn a_part_that_does_not_exist_is_neither_pinned_nor_not() {
+        let layout = LayoutPreview::default();
+        assert_eq!((layout.is_pinned(LayoutPart::Node(0)), layout.is_pinned(LayoutPart::Arc(3))), (None, None));
+    }
+}

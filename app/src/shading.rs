@@ -210,6 +210,7 @@ fn points(line: &[DVec3]) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::{LayoutArc, LayoutNode};
 
     #[test]
     fn only_smooth_edges_share_normals() {
@@ -220,5 +221,43 @@ mod tests {
         let sharp = corner_normals(&up(-2.0), &faces, 0.7);
         assert_eq!(sharp[0][0], DVec3::Z);
         assert!(sharp[1][0].dot(DVec3::Z) < 0.6);
+    }
+
+    fn triangle() -> DisplaySurface {
+        DisplaySurface {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y].into(),
+            faces: vec![[0, 1, 2]].into(),
+            normals: vec![[DVec3::Z; 3]].into(),
+            base: vec![1].into(),
+            regions: vec![RegionColour::Red],
+            ..DisplaySurface::default()
+        }
+    }
+
+    #[test]
+    fn given_tints_replace_the_colours_of_regions() {
+        let [r, g, b] = region_rgb(RegionColour::Red);
+        assert_eq!(surface(&triangle(), None).vertices[0].tint, [r, g, b, 0x80]);
+        // The tint is that of the triangle of the design mesh, number 1.
+        assert_eq!(surface(&triangle(), Some(&[[1; 4], [2; 4]])).vertices[0].tint, [2; 4]);
+    }
+
+    #[test]
+    fn large_surfaces_are_framed_by_a_sample() {
+        let display = DisplaySurface { positions: vec![DVec3::X; 100_000].into(), ..DisplaySurface::default() };
+        assert!((10_000..=20_000).contains(&framing_points(&display).len()));
+        assert_eq!(framing_points(&triangle()).len(), 3);
+    }
+
+    #[test]
+    fn a_pinned_arc_is_a_double_line_and_a_pinned_node_a_square() {
+        let node = |pinned| LayoutNode { position: DVec3::ZERO, valence: 4, irregular: false, pinned };
+        for pinned in [false, true] {
+            let arc = LayoutArc { points: vec![DVec3::ZERO, DVec3::X], approximate: false, pinned };
+            let layout = LayoutPreview { arcs: vec![arc], nodes: vec![node(pinned)] };
+            let (mut lines, mut markers) = (Vec::new(), Vec::new());
+            draw_layout(&layout, None, &mut lines, &mut markers);
+            assert_eq!((lines.len(), markers[0].square), (1 + usize::from(pinned), pinned));
+        }
     }
 }

@@ -56,4 +56,22 @@ mod tests {
         let texts = [0.0, 0.012345, 1.2345, 12345.6].map(|x| significant(x, 3));
         assert_eq!(texts, ["0.000000", "0.0123", "1.23", "12346"]);
     }
+
+    #[test]
+    fn one_thing_is_singular() {
+        assert_eq!([0, 1, 2].map(|n| count(n, "patch", "patches")), ["0 patches", "1 patch", "2 patches"]);
+    }
+
+    #[test]
+    fn an_improvement_names_both_states() {
+        let fit = |patches, alignment| plait_core::weave::Fit { patches, alignment, ..Default::default() };
+        let text = improvement(&Improvement { before: fit(20, 9.0), after: fit(1, 4.5), changes: 3 });
+        assert!(text.contains("4.5° with 1 patch (before: 9.0° with 20 patches)"), "{text}");
+    }
+
+    #[test]
+    fn a_search_without_success_claims_no_improvement() {
+        let text = improvement(&Improvement::default());
+        assert!(text.contains("no strips") && !text.contains("before"), "{text}");
+    }
 }

@@ -1,7 +1,9 @@
-//! Everything Plait computes: from a triangle mesh, over woven dual strips, to a quad layout and its files.
+//! Design of quad layouts on triangle meshes by weaving dual strips (Campen, Quad Layouts).
 //!
-//! The library knows no window and no GPU and holds no global state. Data flows one way, from mesh to layout
-//! to file: a module knows the modules before it, never those after it.
+//! Loops are placed on a mesh (`elastica` finds them, `weave` holds the design); the cells of their arrangement (`dual`) are
+//! the nodes of a quad layout (`layout`); the layout is embedded in the surface and its embedding optimised (`embed`, on the
+//! cross fields of `field` and the seamless maps of `param`); at last quads are extracted (`quad`). The library has no user
+//! interface and no global state. Modules depend on each other in one direction, from `solve` and `mesh` to `weave`.
 
 pub mod dual;
 pub mod elastica;

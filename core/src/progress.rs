@@ -1,8 +1,7 @@
-//! Progress of long work, and the wish to stop it.
+//! Progress and cancellation of long work, shared between threads.
 //!
-//! The side that works reports a stage and a fraction and asks now and then whether to go on; the side that
-//! waits reads both and may cancel. Shared by reference between threads. How long each stage took is kept, so that
-//! whoever watches need not know the stages beforehand.
+//! The working thread reports stage and fraction and checks now and then whether it was cancelled; another thread reads both
+//! and may cancel. The time of each stage is recorded.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -10,7 +9,7 @@ use std::time::Instant;
 
 use thiserror::Error;
 
-/// The work was cancelled from outside.
+/// The work was cancelled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("cancelled")]
 pub struct Cancelled;
@@ -19,68 +18,70 @@ pub struct Cancelled;
 #[derive(Debug, Default)]
 pub struct Progress {
     cancelled: AtomicBool,
-    /// Fraction done, in thousandths.
+    /// Fraction of all the work that is done, in thousandths.
     permille: AtomicU32,
-    /// The part of the whole that fractions are of, likewise; nothing: all of it.
-    part: Mutex<Option<[f64; 2]>>,
+    /// The range of all the work that reported fractions refer to, as fractions; `None`: all of it.
+    range: Mutex<Option<[f64; 2]>>,
     stages: Mutex<Stages>,
 }
 
-/// A stage of the work and how long it has taken.
+/// The time a stage has taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageTime {
     /// The stage, as reported.
     pub stage: String,
-    /// Seconds in it, all times together.
+    /// Total seconds in it.
     pub seconds: f64,
-    /// How often it began.
+    /// How many times it was entered.
     pub times: usize,
 }
 
 #[derive(Debug, Default)]
 struct Stages {
-    /// The stages met, in the order of their first report.
-    met: Vec<StageTime>,
-    /// Which of them was reported last.
+    /// All stages, in the order of their first report.
+    all: Vec<StageTime>,
+    /// Index of the stage reported last.
     now: Option<usize>,
-    /// When it began; nothing once the work is done.
+    /// When it was entered; `None` once the work is done.
     since: Option<Instant>,
 }
 
 impl Stages {
+    /// Adds the time since the present stage was entered.
     fn close(&mut self) {
         if let (Some(now), Some(since)) = (self.now, self.since.take()) {
-            self.met[now].seconds += since.elapsed().as_secs_f64();
+            self.all[now].seconds += since.elapsed().as_secs_f64();
         }
     }
 
+    /// Enters a stage.
     fn open(&mut self, stage: &str) {
-        let at = self.met.iter().position(|s| s.stage == stage).unwrap_or(self.met.len());
-        if at == self.met.len() {
-            self.met.push(StageTime { stage: stage.to_owned(), seconds: 0.0, times: 0 });
+        let at = self.all.iter().position(|s| s.stage == stage).unwrap_or(self.all.len());
+        if at == self.all.len() {
+            self.all.push(StageTime { stage: stage.to_owned(), seconds: 0.0, times: 0 });
         }
-        self.met[at].times += 1;
+        self.all[at].times += 1;
         (self.now, self.since) = (Some(at), Some(Instant::now()));
     }
 }
 
 impl Progress {
-    /// Progress that nobody watches yet.
+    /// Progress of work that has not begun.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks the work to stop.
+    /// Cancels the work.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work should stop.
+    /// Whether the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Returns an error once the work should stop.
+    /// Returns an error if the work was cancelled.
     ///
     /// # Errors
     ///
@@ -89,40 +90,40 @@ impl Progress {
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 
-    /// Reports what is being done and how much of the whole is done, from 0 to 1. The stage lasts until another is
-    /// reported; one reported as wholly done takes no time.
+    /// Reports the present stage and the fraction of the work done, 0 to 1. A stage lasts until another one is reported; at
+    /// fraction 1 of all the work its time ends at once.
     pub fn report(&self, stage: &str, fraction: f64) {
-        let part = *self.part.lock().unwrap_or_else(PoisonError::into_inner);
-        let [from, to] = part.unwrap_or([0.0, 1.0]);
-        let of_whole = from + (to - from) * fraction.clamp(0.0, 1.0);
-        self.permille.store((of_whole * 1000.0) as u32, Ordering::Relaxed);
+        let range = *self.range.lock().unwrap_or_else(PoisonError::into_inner);
+        let [from, to] = range.unwrap_or([0.0, 1.0]);
+        let of_all = from + (to - from) * fraction.clamp(0.0, 1.0);
+        self.permille.store((of_all * 1000.0) as u32, Ordering::Relaxed);
         let mut stages = self.stages();
-        let same = stages.now.is_some_and(|now| stages.met[now].stage == stage);
+        let same = stages.now.is_some_and(|now| stages.all[now].stage == stage);
         if !same {
             stages.close();
             stages.open(stage);
         }
-        if fraction >= 1.0 && part.is_none() {
+        if fraction >= 1.0 && range.is_none() {
             stages.close();
         }
     }
 
-    /// Takes the fractions reported from now on for those of a part of the whole, or of all of it again.
-    pub fn set_range(&self, part: Option<[f64; 2]>) {
-        *self.part.lock().unwrap_or_else(PoisonError::into_inner) = part;
+    /// Sets the range of all the work that fractions reported from now on refer to; `None`: all of it.
+    pub fn set_range(&self, range: Option<[f64; 2]>) {
+        *self.range.lock().unwrap_or_else(PoisonError::into_inner) = range;
     }
 
-    /// The stage and the fraction last reported.
+    /// The stage reported last, and the fraction of all the work.
     pub fn state(&self) -> (String, f64) {
         let stages = self.stages();
-        let text = stages.now.map(|now| stages.met[now].stage.clone()).unwrap_or_default();
+        let text = stages.now.map(|now| stages.all[now].stage.clone()).unwrap_or_default();
         (text, f64::from(self.permille.load(Ordering::Relaxed)) / 1000.0)
     }
 
-    /// The stages so far in the order of their first report, the present one up to now.
+    /// All stages in the order of their first report; the present one with its time up to now.
     pub fn stage_times(&self) -> Vec<StageTime> {
         let stages = self.stages();
-        let mut list = stages.met.clone();
+        let mut list = stages.all.clone();
         if let (Some(now), Some(since)) = (stages.now, stages.since) {
             list[now].seconds += since.elapsed().as_secs_f64();
         }
@@ -139,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stages_add_up_under_their_names() {
+    fn times_of_equal_stages_are_summed() {
         let progress = Progress::new();
         assert_eq!((progress.state(), progress.stage_times()), ((String::new(), 0.0), Vec::new()));
         for (stage, fraction) in [("a", 0.0), ("a", 0.2), ("b", 0.5), ("a", 0.75), ("done", 1.0)] {
@@ -154,12 +155,12 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_the_work_reports_as_a_part_of_the_whole() {
+    fn fractions_refer_to_the_range_that_is_set() {
         let progress = Progress::new();
         progress.set_range(Some([0.2, 0.6]));
         progress.report("part", 0.5);
         assert_eq!(progress.state(), ("part".to_owned(), 0.4));
-        // The end of a part is not the end: time goes on.
+        // The end of a range is not the end of the work: time goes on.
         progress.report("part", 1.0);
         let before = progress.stage_times()[0].seconds;
         std::thread::sleep(std::time::Duration::from_millis(2));

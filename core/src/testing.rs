@@ -1,4 +1,4 @@
-//! What tests of several rooms need: small meshes and curves, meshes beside the repository.
+//! Small meshes and curves for tests, and the research meshes beside the repository.
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,11 @@ use glam::DVec3;
 use crate::mesh::{HalfedgeId, LoadedMesh, TriMesh, load};
 use crate::surface::{Crossing, SurfaceCurve};
 
-/// Says that a test or a part of one is left out, and why.
+/// Reports that a test or a part of one is skipped, and why.
 ///
 /// # Panics
 ///
-/// When the environment variable `PLAIT_TEST_ALL` is set: then everything a test needs has to be there.
+/// If the environment variable `PLAIT_TEST_ALL` is set: then nothing may be skipped.
 pub(crate) fn skip(reason: &str) {
     assert!(std::env::var_os("PLAIT_TEST_ALL").is_none(), "PLAIT_TEST_ALL is set, but {reason}");
     eprintln!("skipped: {reason}");
@@ -39,8 +39,8 @@ pub(crate) fn research_mesh(file: &str) -> Option<LoadedMesh> {
     None
 }
 
-/// A grid of `n` × `m` cells, each of two triangles, closed or open in each direction, mapped by `map` from
-/// fractions of both directions. Cell `(i, j)` holds faces `2 (j n + i)` and the one after.
+/// A grid of `n` × `m` cells of two triangles each, closed or open in each direction; `map` takes the fractions of both
+/// directions to positions. Cell `(i, j)` has faces `2 (j n + i)` and the next one.
 pub(crate) fn grid(n: u32, m: u32, closed: [bool; 2], map: impl Fn(f64, f64) -> DVec3) -> TriMesh {
     let (columns, rows) = (n + u32::from(!closed[0]), m + u32::from(!closed[1]));
     let mut positions = Vec::new();
@@ -74,7 +74,7 @@ pub(crate) fn square(n: u32) -> TriMesh {
     grid(n, n, [false, false], |u, v| DVec3::new(u, v, 0.0))
 }
 
-/// The curve along row `j` of a [`grid`], crossing each edge at fraction `t` of its height.
+/// The curve along row `j` of a [`grid`], at fraction `t` of the row's height.
 pub(crate) fn row(n: u32, j: u32, closed: bool, t: f64) -> SurfaceCurve {
     let mut crossings = Vec::new();
     if !closed {
@@ -88,7 +88,7 @@ pub(crate) fn row(n: u32, j: u32, closed: bool, t: f64) -> SurfaceCurve {
     SurfaceCurve { crossings, closed }
 }
 
-/// The curve along column `i` of a [`grid`] of `n` × `m` cells, at fraction `t` of each edge's width.
+/// The curve along column `i` of a [`grid`] of `n` × `m` cells, at fraction `t` of the column's width.
 pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCurve {
     let mut crossings = Vec::new();
     if !closed {
@@ -102,7 +102,7 @@ pub(crate) fn column(n: u32, m: u32, i: u32, closed: bool, t: f64) -> SurfaceCur
     SurfaceCurve { crossings, closed }
 }
 
-/// The closed curve along the diagonals of a closed [`grid`] of `n` × `n` cells, between these.
+/// The closed curve parallel to the diagonals of a closed [`grid`] of `n` × `n` cells, beside the main diagonal.
 pub(crate) fn diagonal(n: u32) -> SurfaceCurve {
     let beside = |i: u32| {
         let cell = 2 * (i * n + i);

@@ -1,17 +1,18 @@
-//! Disjoint sets of numbers, joined step by step.
+//! Disjoint sets (union-find).
 
-/// Sets of the numbers from 0 to `n − 1`, each on its own at first.
+/// Disjoint sets of the numbers 0 to `n − 1`.
 #[derive(Debug)]
 pub(crate) struct UnionFind {
     parent: Vec<u32>,
 }
 
 impl UnionFind {
+    /// Sets of one number each.
     pub(crate) fn new(n: usize) -> Self {
         Self { parent: (0..n as u32).collect() }
     }
 
-    /// The number that stands for the set of `a`: the smallest of the set.
+    /// The representative of the set of `a`: its smallest number.
     pub(crate) fn root(&mut self, mut a: u32) -> u32 {
         while self.parent[a as usize] != a {
             self.parent[a as usize] = self.parent[self.parent[a as usize] as usize];
@@ -20,7 +21,7 @@ impl UnionFind {
         a
     }
 
-    /// Joins the sets of `a` and `b`; returns whether they were two.
+    /// Joins the sets of `a` and `b`; says whether they were different.
     pub(crate) fn join(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
@@ -33,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn joined_numbers_share_the_smallest() {
+    fn the_smallest_number_represents_a_set() {
         let mut sets = UnionFind::new(6);
         assert!(sets.join(4, 2) && sets.join(5, 4));
         assert!(!sets.join(2, 5));

@@ -69,3 +69,27 @@ fn read_session(input: &Path, suggest: bool, detail: &DetailArguments, progress:
     };
     Ok(Session::open(loaded, source, detail.over(Options::default()), progress)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::session_engine::SessionOpener;
+
+    #[test]
+    fn extensions_are_known_in_upper_case() {
+        assert!(has_extension(Path::new("a.PLAIT"), "plait") && !has_extension(Path::new("plait"), "plait"));
+    }
+
+    #[test]
+    fn a_name_without_a_file_is_a_built_in_model() {
+        assert_eq!(source(Path::new("Torus"), &SessionOpener), Source::BuiltIn("torus".into()));
+        assert_eq!(source(Path::new("torus.obj"), &SessionOpener), Source::File("torus.obj".into()));
+    }
+
+    #[test]
+    fn a_mesh_needs_suggestions() {
+        let error = open_session(Path::new("a.obj"), false, &DetailArguments::default(), &Progress::new());
+        assert!(error.unwrap_err().to_string().contains("--suggest"));
+    }
+}

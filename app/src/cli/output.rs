@@ -89,3 +89,28 @@ pub(super) fn explain(session: &Session, error: WeaveError) -> anyhow::Error {
     }
     anyhow::anyhow!(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NO_SIZE: SizeArguments = SizeArguments { edge_length: None, quads: None };
+    const NO_CHANGE: RefineArguments = RefineArguments { integer: false, simplify: false, collapse: None };
+
+    #[test]
+    fn lengths_must_be_positive() {
+        for length in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let size = SizeArguments { edge_length: Some(length), ..NO_SIZE };
+            assert!(export_options(size, NO_CHANGE, None).is_err(), "{length}");
+            let refine = RefineArguments { collapse: Some(Some(length)), ..NO_CHANGE };
+            assert!(export_options(NO_SIZE, refine, None).is_err(), "{length}");
+        }
+    }
+
+    #[test]
+    fn collapse_without_a_length_is_by_the_edge_of_a_quad() {
+        let refine = RefineArguments { collapse: Some(None), ..NO_CHANGE };
+        let options = export_options(NO_SIZE, refine, None).unwrap();
+        assert!(matches!(options.collapse, Some(CollapseLength::Quad)));
+    }
+}

@@ -202,16 +202,20 @@ mod tests {
     }
 
     #[test]
-    fn markers_and_stripes_show() {
+    fn a_square_marker_covers_more_than_a_disc_but_not_its_core() {
         let mut gpu = Headless::new().unwrap();
         let marker =
             Marker { position: [0.1, 0.1, 0.0], colour: [0, 255, 0, 255], radius: 6.0, hidden: 0.0, square: false };
-        let marked = gpu.render(&frame(false, vec![], vec![marker.clone()])).unwrap();
-        let disc = greens(&marked);
+        let disc = greens(&gpu.render(&frame(false, vec![], vec![marker.clone()])).unwrap());
         assert!((50..130).contains(&disc), "{disc}");
         let square = Marker { square: true, radius: 9.0, ..marker };
         let square = greens(&gpu.render(&frame(false, vec![], vec![square])).unwrap());
         assert!(square > disc && square < 15 * 15, "{square}");
+    }
+
+    #[test]
+    fn stripes_are_drawn_only_when_they_are_on() {
+        let mut gpu = Headless::new().unwrap();
         let blue = |p: &image::RgbaImage| p.pixels().filter(|p| p[2] > p[0].saturating_add(40)).count();
         assert_eq!(blue(&gpu.render(&frame(false, vec![], vec![])).unwrap()), 0);
         assert!(blue(&gpu.render(&frame(true, vec![], vec![])).unwrap()) > 300);

@@ -199,3 +199,23 @@ fn marker(m: &Marker) -> MarkerInstance {
         style: [m.radius, m.hidden, f32::from(u8::from(m.square))],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closed_line_has_a_segment_more_than_an_open_one() {
+        let points = vec![[0.0; 3], [1.0; 3], [2.0; 3]];
+        let line = |points, closed| Polyline { points, closed, colour: [0; 4], width: 1.0, hidden: 0.0 };
+        assert_eq!(segments(&line(points.clone(), false)).count(), 2);
+        let last = segments(&line(points, true)).last().unwrap();
+        assert_eq!((last.before, last.start, last.end, last.after), ([1.0; 3], [2.0; 3], [0.0; 3], [1.0; 3]));
+    }
+
+    #[test]
+    fn a_single_point_is_no_line() {
+        let line = Polyline { points: vec![[0.0; 3]], closed: true, colour: [0; 4], width: 1.0, hidden: 0.0 };
+        assert_eq!(segments(&line).count(), 0);
+    }
+}

@@ -115,3 +115,32 @@ impl Problem {
         count(n, one, many)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(colour: Colour, findings: Vec<Finding>) -> RegionReport {
+        RegionReport { colour, findings, valence: 2, curvature: 0.0, area: 1.0, corners: Vec::new() }
+    }
+
+    #[test]
+    fn problems_are_counted_in_singular_and_plural() {
+        assert_eq!(Problem::Handles.text(1), "1 region contains a handle");
+        assert_eq!(Problem::Handles.text(2), "2 regions contain handles");
+    }
+
+    #[test]
+    fn a_region_without_a_colour_has_no_problem() {
+        assert_eq!(problem(&report(Colour::None, vec![Finding::Digon])), None);
+        assert_eq!(problem(&report(Colour::Orange, vec![Finding::Digon])), Some(Problem::Digon));
+    }
+
+    #[test]
+    fn the_first_finding_decides() {
+        let findings = vec![Finding::Borders { borders: 2 }, Finding::Handles { handles: 1 }];
+        assert_eq!(problem(&report(Colour::Red, findings)), Some(Problem::Annulus));
+        let findings = vec![Finding::Borders { borders: 3 }];
+        assert_eq!(problem(&report(Colour::Red, findings)), Some(Problem::Borders));
+    }
+}

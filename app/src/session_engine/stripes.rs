@@ -24,15 +24,15 @@ pub(super) fn covering_strip(
     visible: impl Fn(u32) -> bool,
 ) -> Option<(&StripCoverage, [f64; 3])> {
     let strip = &map.strips[map.covered[f][k]? as usize];
-    visible(strip.curve).then(|| (strip, map.stripe[f][k].map(f64::from)))
+    visible(strip.curve).then(|| (strip, map.spine_distance[f][k].map(f64::from)))
 }
 
 /// Stripe coordinates from distances to the spine. Each side of the strip is divided evenly, so that it ends with a
 /// line.
 pub(super) fn stripes(strip: &StripCoverage, distance: [f64; 3]) -> Stripes {
-    let lines = strip.bounds.map(|b| (b / SPACING).round().clamp(1.0, MAX_LINES));
+    let lines = strip.widths.map(|b| (b / SPACING).round().clamp(1.0, MAX_LINES));
     let side = |d: f64| usize::from(d < 0.0);
-    let at = distance.map(|d| d / strip.bounds[side(d)].max(1e-9) * lines[side(d)]);
+    let at = distance.map(|d| d / strip.widths[side(d)].max(1e-9) * lines[side(d)]);
     Stripes { at, reach: lines.map(|n| n as u8) }
 }
 
@@ -42,9 +42,16 @@ mod tests {
 
     #[test]
     fn a_strip_ends_with_a_line_on_both_sides() {
-        let strip = StripCoverage { curve: 0, bounds: [0.1, 0.05], faces: 3 };
+        let strip = StripCoverage { curve: 0, widths: [0.1, 0.05], faces: 3 };
         let Stripes { at, reach } = stripes(&strip, [0.1, 0.0, -0.05]);
         assert_eq!(reach, [8, 4]);
         assert!((at[0] - 8.0).abs() < 1e-12 && at[1] == 0.0 && (at[2] + 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wide_strip_has_at_most_as_many_lines_as_the_renderer_counts() {
+        let strip = StripCoverage { curve: 0, widths: [10.0, 1e-6], faces: 1 };
+        let Stripes { at, reach } = stripes(&strip, [10.0, 0.0, 0.0]);
+        assert_eq!((reach, at[0]), ([120, 1], 120.0));
     }
 }

@@ -140,3 +140,19 @@ impl ViewOptions {
         *value = !*value;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn toggling_an_option_changes_no_other() {
+        for option in ViewOption::ALL {
+            let mut options = ViewOptions::default();
+            options.toggle(option);
+            for other in ViewOption::ALL {
+                assert_eq!(options.get(other) != ViewOptions::default().get(other), other == option, "{other:?}");
+            }
+        }
+    }
+}

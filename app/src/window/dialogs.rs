@@ -267,3 +267,54 @@ impl OwnDialog {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_names_are_made_from_the_name_of_the_model() {
+        let dialogs = Dialogs { suggested_name: "Bunny.obj".into(), ..Dialogs::default() };
+        assert_eq!(dialogs.file_name(Asked::Save), "bunny.plait");
+        assert_eq!(dialogs.file_name(Asked::Export), "bunny-layout");
+        assert_eq!(Dialogs::default().file_name(Asked::Save), "design.plait");
+    }
+
+    #[test]
+    fn only_folders_and_files_that_can_be_opened_are_listed() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.OBJ", "a.plait", "notes.txt", ".hidden.obj"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        std::fs::create_dir(folder.path().join("z")).unwrap();
+        let mut dialog = OwnDialog::new(Asked::Open, "");
+        dialog.enter(folder.path().to_path_buf());
+        let names: Vec<_> = dialog.entries.iter().map(|e| e.0.as_str()).collect();
+        assert_eq!(names, ["z", "a.plait", "b.OBJ"]);
+        dialog.asked = Asked::Export;
+        dialog.list();
+        assert_eq!(dialog.entries, [("z".to_owned(), true)]);
+    }
+
+    #[test]
+    fn a_missing_file_is_not_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut dialog = OwnDialog::new(Asked::Open, "none.obj");
+        dialog.enter(folder.path().to_path_buf());
+        assert_eq!(dialog.accept(), None);
+        assert!(dialog.error.is_some_and(|e| e.contains("none.obj")));
+    }
+
+    #[test]
+    fn a_folder_is_entered_unless_it_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("inner");
+        std::fs::create_dir(&inner).unwrap();
+        for (asked, chosen, now) in [(Asked::Open, None, &*inner), (Asked::Export, Some(inner.clone()), folder.path())]
+        {
+            let mut dialog = OwnDialog::new(asked, "inner");
+            dialog.enter(folder.path().to_path_buf());
+            assert_eq!((dialog.accept(), &*dialog.folder), (chosen, now));
+        }
+    }
+}

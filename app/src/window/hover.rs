@@ -58,3 +58,40 @@ impl Hover {
         self.chosen = self.chosen.saturating_add_signed(by as isize).min(last);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use plait_core::surface::SurfaceCurve;
+
+    use super::*;
+
+    fn proposal(cost: f64) -> Proposal {
+        let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
+        Proposal { curve, cost, energy: None, polyline: Vec::new() }
+    }
+
+    #[test]
+    fn replies_to_older_requests_are_ignored() {
+        let mut hover = Hover { generation: Some(2), ..Hover::default() };
+        assert!(hover.arrived(1, vec![proposal(1.0)], true).is_none() && hover.proposals.is_empty());
+        hover.arrived(2, vec![proposal(1.0)], true);
+        assert_eq!(hover.proposals.len(), 1);
+    }
+
+    #[test]
+    fn an_early_click_places_the_best_proposal_once_it_is_known() {
+        let mut hover = Hover { generation: Some(1), place_on_arrival: true, ..Hover::default() };
+        assert_eq!(hover.arrived(1, vec![proposal(2.0)], false), None);
+        assert_eq!(hover.arrived(1, vec![proposal(1.0)], true).map(|p| p.cost), Some(1.0));
+        assert!(!hover.place_on_arrival);
+    }
+
+    #[test]
+    fn browsing_ends_at_the_first_and_the_last_proposal() {
+        let mut hover = Hover { proposals: vec![proposal(1.0), proposal(2.0)], ..Hover::default() };
+        hover.browse(5);
+        assert_eq!(hover.shown().map(|p| p.cost), Some(2.0));
+        hover.browse(-9);
+        assert_eq!(hover.chosen, 0);
+    }
+}

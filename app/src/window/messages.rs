@@ -76,3 +76,49 @@ impl Messages {
         self.list.iter().rev().find_map(|m| m.place)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(messages: &mut Messages) -> Vec<String> {
+        messages.current().0.into_iter().map(|m| m.text).collect()
+    }
+
+    #[test]
+    fn the_oldest_message_is_dropped() {
+        let mut messages = Messages::default();
+        (0..=MAX_MESSAGES).for_each(|i| messages.add(Tone::Failed, i.to_string(), None));
+        assert_eq!(texts(&mut messages), ["1", "2", "3", "4"]);
+    }
+
+    #[test]
+    fn a_repeated_message_is_shown_once_and_last() {
+        let mut messages = Messages::default();
+        for text in ["a", "b", "a"] {
+            messages.add(Tone::Note, text.into(), None);
+        }
+        assert_eq!(texts(&mut messages), ["b", "a"]);
+    }
+
+    #[test]
+    fn errors_stay_and_notes_disappear() {
+        let mut messages = Messages::default();
+        messages.add(Tone::Failed, "error".into(), None);
+        assert_eq!(messages.current().1, None);
+        messages.add(Tone::Note, "note".into(), None);
+        assert!(messages.current().1.is_some_and(|d| d <= DURATION));
+    }
+
+    #[test]
+    fn the_newest_place_is_marked_until_its_message_is_dismissed() {
+        let mut messages = Messages::default();
+        messages.add(Tone::Failed, "first".into(), Some(DVec3::X));
+        messages.add(Tone::Failed, "second".into(), Some(DVec3::Y));
+        messages.add(Tone::Note, "without a place".into(), None);
+        assert_eq!(messages.place(), Some(DVec3::Y));
+        let second = messages.current().0[1].id;
+        messages.dismiss(second);
+        assert_eq!(messages.place(), Some(DVec3::X));
+    }
+}

@@ -59,3 +59,18 @@ impl Prepared {
         (Arc::clone(&self.lines), Arc::clone(&self.markers))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_is_converted_again_only_when_its_input_changes() {
+        let display = Arc::new(DisplaySurface::default());
+        let input = |colour_mode| SurfaceInput { display: Arc::clone(&display), colour_mode, summary: None };
+        let mut prepared = Prepared::default();
+        let first = prepared.surface(input(ColourMode::Regions));
+        assert!(Arc::ptr_eq(&first, &prepared.surface(input(ColourMode::Regions))));
+        assert!(!Arc::ptr_eq(&first, &prepared.surface(input(ColourMode::Conformal))));
+    }
+}

@@ -279,3 +279,25 @@ fn proposal_counter(app: &PlaitApp, ui: &Ui, rect: Rect) {
     painter.rect(label, 9.0, green, Stroke::new(1.0, theme::RAISED), StrokeKind::Outside);
     painter.galley(Align2::CENTER_CENTER.align_size_within_rect(galley.size(), label).min, galley, Color32::WHITE);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FREE: Held = Held { shift: false, ctrl: false };
+
+    #[test]
+    fn a_notch_reported_twice_in_a_frame_counts_once() {
+        let (down, up) = (PointerEvent::Wheel(-1.0, FREE), PointerEvent::Wheel(1.0, FREE));
+        let mut events = vec![down, down, up];
+        drop_doubled_notches(&mut events);
+        assert_eq!(events, [down, up]);
+    }
+
+    #[test]
+    fn scrolling_of_a_touchpad_is_never_dropped() {
+        let mut events = vec![PointerEvent::Scroll(3.0, FREE); 2];
+        drop_doubled_notches(&mut events);
+        assert_eq!(events.len(), 2);
+    }
+}

@@ -1,3 +1,5 @@
+//! Tests of the worker, with an engine whose operations last as long as the test needs.
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -288,4 +290,25 @@ fn a_panic_of_the_engine_costs_one_operation_only() {
     assert!(error.to_string().contains("internal error"));
     worker.request(Job::Save("x".into()));
     assert!(matches!(reply(&worker), Reply::Saved(_)));
+}
+
+#[test]
+fn opening_a_model_drops_the_jobs_that_wait() {
+    let worker = worker();
+    worker.request(Job::Undo);
+    running(&worker, "Undoing");
+    worker.request(Job::Save("x".into()));
+    worker.request(Job::Open(Source::BuiltIn("other".into())));
+    assert!(matches!(reply(&worker), Reply::Failed { error: EngineError::Cancelled, .. }));
+    assert!(matches!(reply(&worker), Reply::Opened { source: Source::BuiltIn(name), .. } if name == "other"));
+}
+
+#[test]
+fn jobs_without_a_model_fail_and_hover_requests_have_no_reply() {
+    let worker = Worker::start(Arc::new(FakeOpener), || ()).unwrap();
+    worker.hover(point(1));
+    worker.request(Job::Suggest);
+    let Reply::Failed { error, .. } = reply(&worker) else { panic!("not a failure") };
+    assert_eq!(error.to_string(), "no model is open");
+    assert!(worker.reply().is_none());
 }

@@ -1,7 +1,7 @@
-//! Makes the built-in models: `cargo run -p plait-core --example make_models`.
+//! Makes the built-in models: `cargo run -p plait-core --example make_models [NAME…]`.
 //!
-//! Each model is the zero set of a smooth function, meshed by surface nets, cut at planes where it is open, and
-//! remeshed to even triangles whose vertices lie on the zero set.
+//! Each model is the zero set of a smooth function, meshed by surface nets, cut at planes where it is open, and remeshed
+//! isotropically with vertices on the zero set.
 
 mod field;
 mod net;
@@ -23,7 +23,7 @@ fn main() -> std::io::Result<()> {
         }
         let soup = net::extract(&shape);
         let mesh = remesh::remesh(&shape, soup);
-        // Five decimals of models about two units wide keep the files small and the surface smooth.
+        // Five decimals, for models about two units wide: small files, and rounding that is not visible in the normals.
         let rounded: Vec<_> = mesh.positions.iter().map(|p| (p * 1e5).round() / 1e5).collect();
         let mut bytes = Vec::new();
         write_obj(&mut bytes, &rounded, &mesh.faces)?;
@@ -36,7 +36,7 @@ fn main() -> std::io::Result<()> {
     Ok(())
 }
 
-/// Says what became of a model, as the program will read it.
+/// Prints topology and quality of a model as loaded.
 fn report(name: &str, bytes: &[u8]) {
     match parse(bytes, name) {
         Ok(loaded) => {

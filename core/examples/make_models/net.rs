@@ -1,4 +1,4 @@
-//! From a function to a first mesh: surface nets, then cuts at planes.
+//! Meshing of an implicit function by surface nets, and cuts at planes.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use glam::{DVec3, UVec3};
 
 use super::shapes::Shape;
 
-/// Triangles over points; each point of an open rim knows the plane it lies on.
+/// A triangle soup with shared vertices; each boundary vertex has the plane it lies on.
 #[derive(Default)]
 pub struct Soup {
     pub positions: Vec<DVec3>,
@@ -16,7 +16,7 @@ pub struct Soup {
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Meshes the zero set of a shape at about its edge length and cuts it open.
+/// Meshes the zero set of a shape with about its edge length, and cuts it.
 pub fn extract(shape: &Shape) -> Soup {
     let n = ((shape.max - shape.min) / shape.edge).ceil().as_uvec3() + UVec3::splat(3);
     let grid = RuntimeShape::<u32, 3>::new(n.to_array());
@@ -36,7 +36,7 @@ pub fn extract(shape: &Shape) -> Soup {
     soup
 }
 
-/// Turns all faces if they look against the gradient.
+/// Reverses all faces if their normals point against the gradient.
 fn face_outwards(shape: &Shape, soup: &mut Soup) {
     let along: f64 =
         soup.faces.iter().map(|&f| normal(&soup.positions, f).dot(shape.gradient(soup.positions[f[0] as usize]))).sum();
@@ -45,17 +45,17 @@ fn face_outwards(shape: &Shape, soup: &mut Soup) {
     }
 }
 
-/// Twice the area of a face times its normal.
+/// The unit normal of a face times twice its area.
 pub fn normal(positions: &[DVec3], face: [u32; 3]) -> DVec3 {
     let [a, b, c] = face.map(|v| positions[v as usize]);
     (b - a).cross(c - a)
 }
 
-/// Cuts off what lies beyond a plane, leaving a rim on it.
+/// Cuts off the part beyond a plane; the new boundary lies in the plane.
 fn cut(shape: &Shape, soup: &mut Soup, plane: usize) {
     let (direction, offset) = shape.cuts[plane];
     let beyond: Vec<f64> = soup.positions.iter().map(|p| direction.dot(*p) - offset).collect();
-    let mut rim: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut cut_vertex: HashMap<(u32, u32), u32> = HashMap::new();
     let mut kept = Vec::new();
     for face in std::mem::take(&mut soup.faces) {
         let mut outline = Vec::new();
@@ -66,7 +66,7 @@ fn cut(shape: &Shape, soup: &mut Soup, plane: usize) {
                 outline.push(a);
             }
             if (da <= 0.0) != (db <= 0.0) {
-                outline.push(*rim.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                outline.push(*cut_vertex.entry((a.min(b), a.max(b))).or_insert_with(|| {
                     let (pa, pb) = (soup.positions[a as usize], soup.positions[b as usize]);
                     soup.positions.push(shape.project(pa.lerp(pb, da / (da - db)), Some(plane)));
                     soup.plane.push(Some(plane));

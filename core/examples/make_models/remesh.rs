@@ -1,5 +1,5 @@
-//! Even triangles on a zero set: splitting, collapsing and flipping edges and moving vertices within the surface
-//! (Botsch and Kobbelt 2004), each vertex brought back onto the surface.
+//! Isotropic remeshing of a zero set (Botsch and Kobbelt 2004): edge splits, collapses and flips, and tangential smoothing,
+//! each followed by projection onto the zero set.
 
 use std::collections::HashSet;
 
@@ -8,8 +8,14 @@ use glam::DVec3;
 use super::net::{Soup, normal};
 use super::shapes::Shape;
 
-/// Rounds of all four steps; the angles no longer change after about ten.
+/// Rounds of all four steps; angles no longer change after about ten.
 const ROUNDS: usize = 14;
+
+/// Rounds of flips for angle and smoothing at the end; chosen by hand.
+const ANGLE_ROUNDS: usize = 4;
+
+/// Passes of flips. Each touches a face at most once; a few reach all.
+const FLIP_PASSES: usize = 6;
 
 /// An undirected edge and the faces at it.
 struct Edge {
@@ -26,8 +32,8 @@ pub fn remesh(shape: &Shape, soup: Soup) -> Soup {
         work.flip(Work::improves_valence);
         work.smooth();
     }
-    // At the end angles count more than valence.
-    for _ in 0..4 {
+    // At the end flips improve angles instead of valences.
+    for _ in 0..ANGLE_ROUNDS {
         work.flip(Work::improves_angle);
         work.smooth();
     }
@@ -49,7 +55,7 @@ impl Work<'_> {
         self.at(a).distance(self.at(b))
     }
 
-    /// All edges in the order of their ends.
+    /// All edges, in the order of their ends.
     fn edges(&self) -> Vec<Edge> {
         let mut sides: Vec<((u32, u32), u32)> = Vec::with_capacity(3 * self.soup.faces.len());
         for (f, face) in self.soup.faces.iter().enumerate() {
@@ -82,14 +88,14 @@ impl Work<'_> {
         list
     }
 
-    /// The middle of an edge, on the surface; on a rim it stays on the rim.
+    /// The midpoint of an edge, projected onto the zero set; of a boundary edge, within its plane.
     fn middle(&self, edge: &Edge) -> (DVec3, Option<usize>) {
         let (a, b) = edge.ends;
         let plane = if edge.faces.len() == 1 { self.soup.plane[a as usize] } else { None };
         (self.shape.project(0.5 * (self.at(a) + self.at(b)), plane), plane)
     }
 
-    /// Splits long edges, at most one of each face; returns how many.
+    /// Splits edges longer than 4/3 of the wanted length, longest first, at most one per face; returns how many.
     fn split(&mut self) -> usize {
         let mut edges = self.edges();
         edges.retain(|e| self.length(e.ends) > 4.0 / 3.0 * self.shape.edge);
@@ -116,7 +122,8 @@ impl Work<'_> {
         n
     }
 
-    /// Collapses short edges that are far enough apart; returns how many.
+    /// Collapses edges shorter than 4/5 of the wanted length, shortest first, with disjoint neighbourhoods; returns how
+    /// many.
     fn collapse(&mut self) -> usize {
         let stars = self.stars();
         let mut edges = self.edges();
@@ -129,12 +136,12 @@ impl Work<'_> {
             let (near_a, near_b) = (self.neighbours(&stars, a), self.neighbours(&stars, b));
             let near: Vec<u32> = near_a.iter().chain(&near_b).copied().collect();
             let common = near_a.iter().filter(|v| near_b.contains(v)).count();
-            let on_rim = |v: u32| self.soup.plane[v as usize].is_some();
-            let crosses = on_rim(a) && on_rim(b) && edge.faces.len() == 2;
-            if crosses || common != edge.faces.len() || near.iter().any(|&v| locked[v as usize]) {
+            let on_boundary = |v: u32| self.soup.plane[v as usize].is_some();
+            let inner_chord = on_boundary(a) && on_boundary(b) && edge.faces.len() == 2;
+            if inner_chord || common != edge.faces.len() || near.iter().any(|&v| locked[v as usize]) {
                 continue;
             }
-            let (position, plane) = match (on_rim(a), on_rim(b)) {
+            let (position, plane) = match (on_boundary(a), on_boundary(b)) {
                 (true, false) => (self.at(a), self.soup.plane[a as usize]),
                 (false, true) => (self.at(b), self.soup.plane[b as usize]),
                 _ => self.middle(edge),
@@ -155,7 +162,7 @@ impl Work<'_> {
         n
     }
 
-    /// Whether no edge gets long and no face turns over.
+    /// Whether a collapse makes no edge too long and no face turn by more than 60°.
     fn may_collapse(&self, stars: &[Vec<u32>], edge: &Edge, near: &[u32], position: DVec3) -> bool {
         let (a, b) = edge.ends;
         let reach = 4.0 / 3.0 * self.shape.edge;
@@ -172,10 +179,9 @@ impl Work<'_> {
         others.clone().all(|&v| self.at(v).distance(position) < reach) && !turns(a) && !turns(b)
     }
 
-    /// Flips the edges for which `better` holds, until none does or no more faces are untouched.
+    /// Flips the edges for which `better` holds, until there are none or the passes are used up.
     fn flip(&mut self, better: fn(&Self, &[i32], [u32; 4]) -> bool) {
-        // Each pass touches a face at most once; a few passes reach them all.
-        for _ in 0..6 {
+        for _ in 0..FLIP_PASSES {
             let edges = self.edges();
             let mut exists: HashSet<(u32, u32)> = edges.iter().map(|e| e.ends).collect();
             let mut excess = self.valence_excess(&edges);
@@ -216,14 +222,14 @@ impl Work<'_> {
         [a, b, other(f), other(g)]
     }
 
-    /// Whether both faces after a flip look where the two before look.
+    /// Whether the normals of both faces after a flip are within 45° of the mean normal before.
     fn stays_flat(&self, [a, b, c, d]: [u32; 4]) -> bool {
         let n = |f: [u32; 3]| normal(&self.soup.positions, f);
         let before = (n([a, b, c]) + n([b, a, d])).normalize_or_zero();
         [n([c, d, b]), n([d, c, a])].iter().all(|m| m.dot(before) > 0.7 * m.length())
     }
 
-    /// How many edges a vertex has more than the six (four on a rim) it should have.
+    /// The valence of each vertex less the regular one, 6 inside and 4 on the boundary.
     fn valence_excess(&self, edges: &[Edge]) -> Vec<i32> {
         let mut excess: Vec<i32> = self.soup.plane.iter().map(|p| if p.is_some() { -4 } else { -6 }).collect();
         for e in edges {
@@ -241,11 +247,11 @@ impl Work<'_> {
 
     fn improves_angle(&self, _: &[i32], [a, b, c, d]: [u32; 4]) -> bool {
         let angle = |v: u32| (self.at(a) - self.at(v)).angle_between(self.at(b) - self.at(v));
-        // The Delaunay condition; the slack keeps squares from flipping to and fro.
+        // The Delaunay condition; the slack keeps squares from flipping back and forth.
         angle(c) + angle(d) > std::f64::consts::PI + 1e-3
     }
 
-    /// Moves each vertex towards the middle of its neighbours, within the surface; a rim vertex along its rim.
+    /// Moves each vertex tangentially towards the mean of its neighbours; a boundary vertex along the boundary.
     fn smooth(&mut self) {
         let edges = self.edges();
         let mut sum = vec![DVec3::ZERO; self.soup.positions.len()];
@@ -267,19 +273,19 @@ impl Work<'_> {
         }
     }
 
-    /// Leaves out the vertices that no face uses any more, in the order in which the faces meet them.
+    /// Drops unused vertices and numbers the others in the order in which faces use them.
     fn compact(self) -> Soup {
-        let mut renamed = vec![u32::MAX; self.soup.positions.len()];
+        let mut new_index = vec![u32::MAX; self.soup.positions.len()];
         let mut out = Soup::default();
         for face in &self.soup.faces {
             for &v in face {
-                if renamed[v as usize] == u32::MAX {
-                    renamed[v as usize] = out.positions.len() as u32;
+                if new_index[v as usize] == u32::MAX {
+                    new_index[v as usize] = out.positions.len() as u32;
                     out.positions.push(self.soup.positions[v as usize]);
                     out.plane.push(self.soup.plane[v as usize]);
                 }
             }
-            out.faces.push(face.map(|v| renamed[v as usize]));
+            out.faces.push(face.map(|v| new_index[v as usize]));
         }
         out
     }

@@ -1,16 +1,16 @@
-//! The models: what they look like.
+//! The shapes of the models.
 
 use glam::{DVec2, DVec3, dvec3};
 
 use super::field::{ellipsoid, round_cone, tube, unite};
 
-/// A model: a function, the box it is meshed in, where it is cut open, and how fine its triangles are.
+/// A model: an implicit function, the box it is meshed in, cutting planes, and edge length.
 pub struct Shape {
     pub name: &'static str,
     pub field: Box<dyn Fn(DVec3) -> f64>,
     pub min: DVec3,
     pub max: DVec3,
-    /// Planes `normal · p = offset`; what lies beyond them is cut off.
+    /// Planes `normal · p = offset`; the part with `normal · p > offset` is cut off.
     pub cuts: Vec<(DVec3, f64)>,
     /// Wanted edge length.
     pub edge: f64,
@@ -19,13 +19,13 @@ pub struct Shape {
 impl Shape {
     /// The gradient of the field, by central differences.
     pub fn gradient(&self, p: DVec3) -> DVec3 {
-        // Small against every feature, large against the rounding of the field.
+        // Small relative to all features, large relative to rounding errors of the field.
         const STEP: f64 = 1e-5;
         let along = |d: DVec3| ((self.field)(p + d * STEP) - (self.field)(p - d * STEP)) / (2.0 * STEP);
         dvec3(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
     }
 
-    /// Moves a point onto the zero set, within a plane if it lies on one.
+    /// Projects a point onto the zero set by Newton steps along the gradient; within a plane if it lies on one.
     pub fn project(&self, mut p: DVec3, plane: Option<usize>) -> DVec3 {
         for _ in 0..8 {
             let mut g = self.gradient(p);
@@ -38,7 +38,7 @@ impl Shape {
                 break;
             }
             let step = g * ((self.field)(p) / steepness);
-            // A long step means that the function is far from linear here.
+            // Where the function is far from linear, Newton steps are too long.
             p -= step.clamp_length_max(0.5 * self.edge);
         }
         p
@@ -50,14 +50,14 @@ pub fn all() -> Vec<Shape> {
     vec![creature(), rounded_cube(), pretzel(), torus(), sleeve()]
 }
 
-fn closed(name: &'static str, half: DVec3, center: DVec3, edge: f64, field: impl Fn(DVec3) -> f64 + 'static) -> Shape {
-    Shape { name, field: Box::new(field), min: center - half, max: center + half, cuts: Vec::new(), edge }
+fn closed(name: &'static str, half: DVec3, centre: DVec3, edge: f64, field: impl Fn(DVec3) -> f64 + 'static) -> Shape {
+    Shape { name, field: Box::new(field), min: centre - half, max: centre + half, cuts: Vec::new(), edge }
 }
 
 /// A four-legged animal with a curled tail.
 fn creature() -> Shape {
     let field = |p: DVec3| {
-        // Left and right are the same; the legs and ears are made once.
+        // The shape is symmetric: legs and ears are defined on one side.
         let q = dvec3(p.x, p.y, p.z.abs());
         let mut d = round_cone(p, dvec3(-0.50, 0.74, 0.0), dvec3(0.42, 0.80, 0.0), 0.30, 0.31);
         d = unite(d, round_cone(p, dvec3(0.55, 0.92, 0.0), dvec3(0.88, 1.32, 0.0), 0.21, 0.16), 0.20);
@@ -66,19 +66,19 @@ fn creature() -> Shape {
         d = unite(d, round_cone(q, dvec3(0.90, 1.54, 0.12), dvec3(0.78, 1.80, 0.25), 0.10, 0.075), 0.10);
         for (hip, foot) in [(0.42, 0.46), (-0.50, -0.54)] {
             let (top, knee) = (dvec3(hip, 0.66, 0.17), dvec3(0.5 * (hip + foot) + 0.02, 0.36, 0.21));
-            let ground = dvec3(foot, 0.13, 0.22);
+            let sole = dvec3(foot, 0.13, 0.22);
             d = unite(d, round_cone(q, top, knee, 0.17, 0.125), 0.14);
-            d = unite(d, round_cone(q, knee, ground, 0.125, 0.11), 0.08);
-            d = unite(d, ellipsoid(q, ground + dvec3(0.05, -0.02, 0.0), dvec3(0.17, 0.11, 0.13)), 0.10);
+            d = unite(d, round_cone(q, knee, sole, 0.125, 0.11), 0.08);
+            d = unite(d, ellipsoid(q, sole + dvec3(0.05, -0.02, 0.0), dvec3(0.17, 0.11, 0.13)), 0.10);
         }
-        // A Bézier curve from the rump up and forward.
+        // The tail: a Bézier curve from the rump up and forward.
         let tail = |t: f64| {
             let s = 1.0 - t;
             let [a, b, c, d] = [(-0.66, 0.84), (-1.20, 0.82), (-1.36, 1.32), (-1.02, 1.62)];
             let at = |a: f64, b: f64, c: f64, d: f64| s * s * s * a + 3.0 * s * t * (s * b + t * c) + t * t * t * d;
             dvec3(at(a.0, b.0, c.0, d.0), at(a.1, b.1, c.1, d.1), 0.0)
         };
-        // Pieces shorter than the triangles leave no trace of their joints.
+        // Pieces shorter than the triangles: their joints are not visible.
         let piece = |i: u32| {
             let (s, t) = (f64::from(i) / 40.0, f64::from(i + 1) / 40.0);
             let r = |t: f64| 0.125 - 0.025 * t;
@@ -90,15 +90,15 @@ fn creature() -> Shape {
     closed("creature", dvec3(1.6, 1.1, 0.6), dvec3(0.05, 0.95, 0.0), 0.044, field)
 }
 
-/// A cube with edges and corners so round that its curvature is smooth everywhere.
+/// A cube with rounded edges and corners: a ball of a p-norm.
 fn rounded_cube() -> Shape {
-    // The fifth power lies between a ball (2) and a cube (infinite).
+    // Between a ball (2) and a cube (infinity).
     const POWER: f64 = 5.0;
     let field = |p: DVec3| p.abs().to_array().map(|x| x.powf(POWER)).iter().sum::<f64>().powf(1.0 / POWER) - 0.8;
     closed("rounded-cube", DVec3::splat(1.0), DVec3::ZERO, 0.058, field)
 }
 
-/// A pretzel: one strand whose ends cross and melt into its bow; genus 3.
+/// A pretzel: one strand whose ends cross and blend into its bow; genus 3.
 fn pretzel() -> Shape {
     let curve: Vec<DVec3> = (0..=400)
         .map(|i| {
@@ -109,6 +109,7 @@ fn pretzel() -> Shape {
     closed("pretzel", dvec3(1.8, 1.3, 0.5), DVec3::ZERO, 0.049, move |p| tube(p, &curve, 0.18))
 }
 
+/// A torus.
 fn torus() -> Shape {
     let field = |p: DVec3| DVec2::new(DVec2::new(p.x, p.z).length() - 0.75, p.y).length() - 0.32;
     closed("torus", dvec3(1.2, 0.45, 1.2), DVec3::ZERO, 0.055, field)
@@ -118,7 +119,7 @@ fn torus() -> Shape {
 fn sleeve() -> Shape {
     let field = |p: DVec3| {
         let q = dvec3(p.x.abs(), p.y, p.z);
-        // Deeper than it is wide would be a barrel: the depth is stretched before the tube is measured.
+        // The trunk is flattened: depth is scaled before the round cone is evaluated.
         let flat = dvec3(p.x, p.y, p.z * 1.45);
         let trunk = round_cone(flat, dvec3(0.0, -0.6, 0.0), dvec3(0.0, 0.92, 0.0), 0.50, 0.44) / 1.2;
         let arm = round_cone(q, dvec3(0.28, 1.02, 0.0), dvec3(1.25, 0.62, 0.0), 0.25, 0.20);

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use super::trace::arcs::TraceError;
 use super::trace::completion::CompletionError;
+use super::trace::error::TraceError;
 use super::trace::rectangles::RectangleError;
 use crate::field::FieldError;
 use crate::layout::PatchError;

@@ -2,15 +2,15 @@
 //!
 //! Data flows through the sub-rooms in this order, and each knows only those before it:
 //!
-//! - [`topology`]: the layout on the triangles of the surface, every arc up to homotopy.
-//! - [`parameterise`]: for nodes at given vertices, a cross field with exactly the layout's singularities and a
+//! - `topology`: the layout on the triangles of the surface, every arc up to homotopy.
+//! - `parameterise`: for nodes at given vertices, a cross field with exactly the layout's singularities and a
 //!   seamless map in which every arc is an isoline; the gradient of its energy at the nodes; quality measures.
-//! - [`trace`]: arcs traced as isolines of the map, the overlay of arcs and mesh, patches as rectangles.
-//! - [`optimise`]: nodes move down the gradient, first with a least-squares map, then with an injective map; features
+//! - `trace`: arcs traced as isolines of the map, the overlay of arcs and mesh, patches as rectangles.
+//! - `optimise`: nodes move down the gradient, first with a least-squares map, then with an injective map; features
 //!   become isolines.
-//! - [`pipeline`]: the phases of an optimisation, from the initial embedding to the result.
+//! - `pipeline`: the phases of an optimisation, from the initial embedding to the result.
 //!
-//! [`problem`] is the input, [`optimise_embedding`] the entry. The room knows layouts and initial embeddings, not how
+//! `problem` is the input, [`optimise_embedding`] the entry. The room knows layouts and initial embeddings, not how
 //! they came about.
 
 mod error;
@@ -33,6 +33,9 @@ pub use pipeline::report::{
 };
 pub use problem::{Problem, Settings, Surface};
 pub use topology::embedding_topology::{ArcHeadings, EmbeddingTopology, TopologyArc, TopologyNode, arc_headings};
-pub use trace::arcs::{ArcChain, FlippedTriangles, TraceError, TracedLayout, preview_arcs, trace_arcs};
+pub use trace::arcs::{FlippedTriangles, preview_arcs, trace_arcs};
 pub use trace::completion::{CompletedLayout, CompletionError, complete_layout};
+pub use trace::error::TraceError;
 pub use trace::rectangles::{RectangleError, map_rectangles};
+pub use trace::separatrix_matching::ArcChain;
+pub use trace::traced_layout::TracedLayout;

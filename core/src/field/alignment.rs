@@ -113,7 +113,7 @@ mod tests {
     use crate::mesh::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edges};
     use crate::progress::Progress;
     use crate::surface::principal_curvature;
-    use crate::testing::{grid, square};
+    use crate::testing::{grid, research_mesh, square};
 
     fn penalties(mesh: &TriMesh) -> Vec<DirectionPenalty> {
         let curvature = principal_curvature(mesh, 0.03, &vec![false; mesh.n_edges()]);
@@ -192,14 +192,7 @@ mod tests {
 
     #[test]
     fn penalties_align_the_field_of_a_real_shape_with_few_more_singularities() {
-        let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
-            || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
-            std::path::PathBuf::from,
-        );
-        let Ok(loaded) = crate::mesh::load(&folder.join("rockerarm_5k.obj")) else {
-            eprintln!("rockerarm_5k.obj not found, skipped");
-            return;
-        };
+        let Some(loaded) = research_mesh("rockerarm_5k.obj") else { return };
         let mesh = loaded.mesh;
         let metric = Metric::new(&mesh);
         let mut sharp = sharp_edges(&mesh, SHARP_DIHEDRAL);

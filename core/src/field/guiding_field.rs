@@ -9,11 +9,11 @@
 //! follow it. The multiple is rounded from a solution without these penalties, then solving and rounding alternate until
 //! no multiple changes; the objective falls in every round.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::cross_field::CrossField;
 use super::error::{FieldError, expect_length};
-use super::singularities::Singularity;
+use super::singularities::{Singularity, vertex_indices};
 use super::smoothing::{EQUILATERAL_EDGE_WEIGHT, edge_weight};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId, components};
 use crate::progress::Progress;
@@ -266,16 +266,11 @@ fn prescribed_rotation(mesh: &TriMesh, metric: &Metric, jump: &[i32], h: Halfedg
 /// on the angles too. Increasing the jump of an edge by one decreases the index of the target of its
 /// [`TriMesh::halfedge`] by one and increases that of the origin.
 pub fn indices(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i32]) -> Vec<i32> {
-    let mut turn: Vec<f64> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { PI } else { TAU }).collect();
-    for h in mesh.halfedges() {
-        turn[mesh.origin(h).index()] -= metric.corner_angle(h);
-        // Crossing `h` leads counter-clockwise around its target.
-        if let Some(t) = mesh.twin(h) {
-            let residual = angle[t.index() / 3] - angle[h.index() / 3] - prescribed_rotation(mesh, metric, jump, h);
-            turn[mesh.target(h).index()] += residual;
-        }
-    }
-    turn.into_iter().map(|a| (a / FRAC_PI_2).round() as i32).collect()
+    vertex_indices(mesh, metric, |h| {
+        let residual =
+            |t: HalfedgeId| angle[t.index() / 3] - angle[h.index() / 3] - prescribed_rotation(mesh, metric, jump, h);
+        mesh.twin(h).map_or(0.0, residual)
+    })
 }
 
 /// The turning number, in quarters, of a closed cycle of triangles in a field of these jumps: the number of quarter turns that

@@ -1,4 +1,4 @@
-//! Shapes that tests of fields and maps share. Their natural curves run along edges.
+//! Shapes for tests of fields and maps. Their symmetric curves run along edges.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::mesh::{EdgeId, TriMesh};
 
-/// A thin torus (on a fat one the smoothest field has singularities) of `n` steps around and `m` steps across; vertex `(i, j)` is number `i m + j`.
+/// A thin torus of `n` steps around and `m` steps across; vertex `(i, j)` is number `i m + j`. (On a thick torus the smoothest
+/// field has singularities.)
 pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
     let at = |i: u32, j: u32| {
         let (a, b) = (turn(i, n), turn(j, m));
@@ -45,7 +46,7 @@ fn split(quads: impl Iterator<Item = [u32; 4]>) -> Vec<[u32; 3]> {
     quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
 }
 
-/// The surface of the cells of a cubic lattice that `solid` tells, each lattice cell of `n` steps.
+/// The boundary surface of the cells `solid` of a cubic lattice, with `n` steps along a cell's edge.
 pub(crate) fn cells(solid: &[[i32; 3]], n: i32) -> TriMesh {
     let inside = |c: [i32; 3]| solid.contains(&c);
     let mut ids = BTreeMap::new();
@@ -87,7 +88,7 @@ pub(crate) fn plate(holes: i32, n: i32) -> TriMesh {
     cells(&solid, n)
 }
 
-/// A sphere from an octahedron of `n` steps along an edge: its three coordinate circles are edge paths.
+/// A sphere, made from an octahedron with `n` steps along an edge; its three coordinate circles are edge paths.
 pub(crate) fn octasphere(n: i32) -> TriMesh {
     let mut ids: BTreeMap<[i32; 3], u32> = BTreeMap::new();
     let mut faces = Vec::new();
@@ -122,7 +123,7 @@ pub(crate) fn edge_between(mesh: &TriMesh, a: u32, b: u32) -> EdgeId {
     mesh.edges().find(|&e| ends(e) == [a, b] || ends(e) == [b, a]).unwrap()
 }
 
-/// Marks the edges whose two ends satisfy `on` with curve `curve`.
+/// Gives the edges whose two ends satisfy `on` the curve number `curve`.
 pub(crate) fn mark(mesh: &TriMesh, curves: &mut Vec<Option<u32>>, curve: u32, on: impl Fn(DVec3) -> bool) {
     curves.resize(mesh.n_edges(), None);
     for e in mesh.edges() {
@@ -132,7 +133,7 @@ pub(crate) fn mark(mesh: &TriMesh, curves: &mut Vec<Option<u32>>, curve: u32, on
     }
 }
 
-/// A mesh with the curves of `curves` carried along after `count` pseudo-random edge splits close to an end.
+/// The mesh and its curves after `count` pseudo-random edge splits close to an end.
 pub(crate) fn slivers(mesh: &TriMesh, curves: &[Option<u32>], count: usize) -> (TriMesh, Vec<Option<u32>>) {
     let mut positions = mesh.positions().to_vec();
     let mut faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();

@@ -5,7 +5,7 @@
 //! of boundary vertices, which are counted against the direction of the boundary.
 
 use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::period_jumps::residual_rotation;
 use crate::mesh::{Dijkstra, HalfedgeId, TriMesh, VertexId};
@@ -32,20 +32,23 @@ pub(super) fn all_singularities(mesh: &TriMesh, metric: &Metric, angle: &[f64], 
 
 /// The vertices of non-zero index; those on the boundary only if `boundary`.
 fn collect(mesh: &TriMesh, metric: &Metric, angle: &[f64], jump: &[i8], boundary: bool) -> Vec<Singularity> {
-    let mut turn: Vec<f64> = mesh
-        .vertices()
-        .map(|v| if mesh.is_boundary_vertex(v) { std::f64::consts::PI } else { 2.0 * std::f64::consts::PI })
-        .collect();
-    for h in mesh.halfedges() {
-        // Crossing `h` leads counter-clockwise around its target.
-        turn[mesh.origin(h).index()] -= metric.corner_angle(h);
-        turn[mesh.target(h).index()] += residual_rotation(metric, mesh, angle, jump, h);
-    }
+    let index = vertex_indices(mesh, metric, |h| residual_rotation(metric, mesh, angle, jump, h));
     mesh.vertices()
         .filter(|&v| boundary || !mesh.is_boundary_vertex(v))
-        .map(|vertex| Singularity { vertex, index: (turn[vertex.index()] / FRAC_PI_2).round() as i8 })
+        .map(|vertex| Singularity { vertex, index: index[vertex.index()] as i8 })
         .filter(|s| s.index != 0)
         .collect()
+}
+
+/// The index of each vertex in quarters; `residual` is the residual rotation across a half-edge, zero on the boundary.
+pub(super) fn vertex_indices(mesh: &TriMesh, metric: &Metric, residual: impl Fn(HalfedgeId) -> f64) -> Vec<i32> {
+    let mut turn: Vec<f64> = mesh.vertices().map(|v| if mesh.is_boundary_vertex(v) { PI } else { TAU }).collect();
+    for h in mesh.halfedges() {
+        turn[mesh.origin(h).index()] -= metric.corner_angle(h);
+        // Crossing `h` leads counter-clockwise around its target.
+        turn[mesh.target(h).index()] += residual(h);
+    }
+    turn.into_iter().map(|a| (a / FRAC_PI_2).round() as i32).collect()
 }
 
 /// The singularities that remain when pairs of opposite sign closer than `radius`, measured along edges, cancel, the closest

@@ -5,6 +5,7 @@ use super::*;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::Metric;
+use crate::testing::research_mesh;
 
 fn sum(s: &[Singularity]) -> i64 {
     s.iter().map(|s| i64::from(s.index)).sum()
@@ -177,23 +178,10 @@ fn the_smoothed_tangent_of_a_zigzag_deviates_from_its_edges() {
     }
 }
 
-/// A real mesh, or a note that it is missing.
-fn real(name: &str) -> Option<std::sync::Arc<TriMesh>> {
-    let folder = std::env::var_os("PLAIT_MESHES").map_or_else(
-        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
-        std::path::PathBuf::from,
-    );
-    let mesh = crate::mesh::load(&folder.join(name)).ok().map(|l| l.mesh);
-    if mesh.is_none() {
-        eprintln!("{name} not found, skipped");
-    }
-    mesh
-}
-
 #[test]
 fn real_shapes_keep_tens_of_singularities() {
     for name in ["bunny_7k.off", "rockerarm_5k.obj"] {
-        let Some(mesh) = real(name) else { continue };
+        let Some(mesh) = research_mesh(name).map(|loaded| loaded.mesh) else { continue };
         let field = shape(&mesh);
         assert_eq!(sum(&field.singularities), 4 * mesh.euler_characteristic());
         let kept = cancel_opposite_pairs(&mesh, &field.singularities, 0.05);

@@ -217,4 +217,16 @@ mod tests {
         assert_eq!(count_flipped(&mesh, &map), 0);
         assert!(stretch(&mesh, &map).0 < 0.5 * stretch(&mesh, &harmonic).0);
     }
+
+    #[test]
+    fn fixed_vertices_stay_and_flipped_triangles_are_counted() {
+        let mesh = grid(2, 2, [false, false], |u, v| glam::DVec3::new(u, v, 0.0));
+        let mut map: Vec<DVec2> = mesh.vertices().map(|v| mesh.position(v).truncate()).collect();
+        let fixed: Vec<Option<DVec2>> = map.iter().map(|&p| Some(2.0 * p)).collect();
+        let fixed_map = disc_map(&mesh, &fixed, InitialWeights::Cotangent).unwrap();
+        assert!(fixed_map.iter().zip(&fixed).all(|(p, q)| Some(*p) == *q));
+        assert_eq!(count_flipped(&mesh, &map), 0);
+        map.iter_mut().for_each(|p| p.x = -p.x);
+        assert_eq!(count_flipped(&mesh, &map), mesh.n_faces());
+    }
 }

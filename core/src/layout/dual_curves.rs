@@ -38,7 +38,7 @@ pub enum DualCurvesError {
     },
     /// There is no path for a dual curve.
     #[error("no path for a dual curve in patch {patch}: {source}")]
-    Draw {
+    Path {
         /// The patch.
         patch: usize,
         /// Where the path ends.
@@ -188,15 +188,15 @@ impl DualPatch {
             }
             let at = |k: usize| {
                 let arc = layout.patches[p].sides[k].0 as usize;
-                sides[k].iter().copied().find(|&v| submesh.whole[v as usize] == middles[arc])
+                sides[k].iter().copied().find(|&v| submesh.parent[v as usize] == middles[arc])
             };
             let (Some(from), Some(to)) = (at(i), at(i + 2)) else {
                 return Err(PatchShapeError::Sides { patch: p }.into());
             };
             mesh.insert_path((from, to), Mark::Curve(chord), |_, _| true, |_| false, |m, v| m.uv[v as usize])
-                .map_err(|source| DualCurvesError::Draw { patch: p, source })?;
+                .map_err(|source| DualCurvesError::Path { patch: p, source })?;
         }
-        Ok(Self { mesh, parent: submesh.whole, faces })
+        Ok(Self { mesh, parent: submesh.parent, faces })
     }
 }
 

@@ -35,3 +35,17 @@ pub(super) fn path_lengths(positions: &[DVec3], path: &[u32]) -> Vec<f64> {
     }
     along
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn path_lengths_increase_strictly_even_at_coincident_vertices() {
+        let positions = [DVec3::ZERO, DVec3::X, DVec3::X, DVec3::new(1.0, 2.0, 0.0)];
+        let along = path_lengths(&positions, &[0, 1, 2, 3]);
+        assert_eq!(along[..2], [0.0, 1.0]);
+        assert!(along.windows(2).all(|w| w[0] < w[1]));
+        assert!((along[3] - 3.0).abs() < 2.0 * MIN_STEP);
+    }
+}

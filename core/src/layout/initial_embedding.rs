@@ -45,7 +45,7 @@ pub enum InitialEmbeddingError {
     },
     /// There is no path for a half arc.
     #[error("no path for an arc in region {region}: {source}")]
-    Draw {
+    Path {
         /// The region.
         region: usize,
         /// Where the path ends.
@@ -147,10 +147,10 @@ impl RegionPart {
         let disc = mesh.to_mesh().map_err(|source| InitialEmbeddingError::NoDisc { region: r, source })?;
         let node = match stretch {
             Some(k) => boundary_node(&disc, &sides[k], |v| {
-                preferred.is_some_and(|p| submesh.whole.get(v as usize) == Some(&p.0))
+                preferred.is_some_and(|p| submesh.parent.get(v as usize) == Some(&p.0))
             }),
             None => preferred
-                .and_then(|v| submesh.whole.iter().position(|&w| w == v.0))
+                .and_then(|v| submesh.parent.iter().position(|&w| w == v.0))
                 .filter(|&v| !disc.is_boundary_vertex(VertexId::new(v)))
                 .map_or_else(|| innermost(&disc), |v| v as u32),
         };
@@ -163,17 +163,17 @@ impl RegionPart {
                 continue;
             }
             let middle =
-                sides[k].iter().copied().find(|&v| submesh.whole.get(v as usize) == Some(&middles[segment as usize]));
+                sides[k].iter().copied().find(|&v| submesh.parent.get(v as usize) == Some(&middles[segment as usize]));
             let middle = middle.ok_or(InitialEmbeddingError::Halves { arc: segment as usize })?;
             let path = mesh
                 .insert_path((node, middle), Mark::Arc(segment), |_, _| true, |_| true, |m, v| m.uv[v as usize])
-                .map_err(|source| InitialEmbeddingError::Draw { region: r, source })?;
+                .map_err(|source| InitialEmbeddingError::Path { region: r, source })?;
             halves.push((segment, forward, path));
         }
         if let Some(k) = stretch {
             halves.extend(boundary_halves(border, &sides[k], k, node));
         }
-        Ok(Self { mesh, parent: submesh.whole, faces: region.faces.clone(), node, halves })
+        Ok(Self { mesh, parent: submesh.parent, faces: region.faces.clone(), node, halves })
     }
 }
 

@@ -26,6 +26,7 @@ mod tests;
 mod transfer;
 
 pub use collapse::{CollapseError, CollapsedLayout};
+pub(crate) use disc_map::count_flipped;
 pub use dual_curves::{DualCurve, DualCurvesError};
 pub use embedding::Embedding;
 #[cfg(test)]
@@ -35,21 +36,9 @@ pub use file::{
     PartialEmbeddingError, PartialRegion, PathPoint,
 };
 pub use initial_embedding::{InitialEmbeddingError, initial_embedding};
-pub(crate) use patch_disc::ArcLookup;
 pub use patch_disc::PatchShapeError;
+pub(crate) use patch_disc::{ArcLookup, PatchDisc};
 pub use patch_map::{PatchError, PatchMap, map_patches};
 pub use reembedding::{Reembedded, ReembeddingError, reembed};
 pub use structure::{Arc, LayoutError, Node, Patch, QuadLayout};
 pub use transfer::transfer_embedding;
-
-// Former names, until all callers use the present ones.
-pub use file::LayoutElement as Part;
-pub use initial_embedding::initial_embedding as embed;
-pub use reembedding::reembed as redraw;
-pub use transfer::transfer_embedding as carry;
-pub(crate) use {
-    disc_map::count_flipped as flipped,
-    patch_disc::{patch_faces, patch_sides},
-    submesh::Submesh,
-};
-mod compat;

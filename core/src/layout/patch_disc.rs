@@ -84,7 +84,7 @@ impl ArcLookup {
 }
 
 /// The faces reached from `seed` without crossing an arc, ascending.
-pub(crate) fn patch_faces(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
+fn patch_faces(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) -> bool) -> Vec<u32> {
     let mut search = BreadthFirst::sparse();
     search.start(seed);
     while let Some(f) = search.visit() {
@@ -98,12 +98,7 @@ pub(crate) fn patch_faces(mesh: &RefinedMesh, seed: u32, on_arc: impl Fn(u32) ->
 }
 
 /// The vertices of the four sides in the order of the layout's patch, each from corner to corner.
-pub(crate) fn patch_sides(
-    layout: &QuadLayout,
-    lookup: &ArcLookup,
-    submesh: &Submesh,
-    p: usize,
-) -> Option<[Vec<u32>; 4]> {
+fn patch_sides(layout: &QuadLayout, lookup: &ArcLookup, submesh: &Submesh, p: usize) -> Option<[Vec<u32>; 4]> {
     let mesh = &submesh.mesh;
     let start = mesh.halfedges().find(|&h| mesh.twin(h).is_none())?;
     let mut cycle = vec![start];
@@ -116,7 +111,7 @@ pub(crate) fn patch_sides(
         }
         cycle.push(h);
     }
-    let parent = |v: VertexId| submesh.whole[v.index()];
+    let parent = |v: VertexId| submesh.parent[v.index()];
     let n = cycle.len();
     let corners: Vec<usize> = (0..n).filter(|&i| lookup.is_node[parent(mesh.origin(cycle[i])) as usize]).collect();
     if corners.len() != 4 {

@@ -42,7 +42,7 @@ pub struct PatchMap {
     /// The patch as a mesh of its own.
     pub mesh: TriMesh,
     /// Vertex of the embedding for each of the first vertices; the others lie inside the patch.
-    pub whole: Vec<u32>,
+    pub parent: Vec<u32>,
     /// Triangle of the original mesh that each face lies in.
     pub base_face: Vec<u32>,
     /// Image of each vertex.
@@ -106,7 +106,7 @@ fn map_patch(
     let base_face = (0..refined.n_faces() as u32)
         .map(|f| embedding.base_face[faces[refined.base_face(f) as usize] as usize])
         .collect();
-    Ok(PatchMap { mesh, whole: submesh.whole, base_face, uv, size, flipped })
+    Ok(PatchMap { mesh, parent: submesh.parent, base_face, uv, size, flipped })
 }
 
 /// Splits inner edges that join two vertices of one side. On a straight side their triangles would be degenerate.
@@ -206,5 +206,53 @@ impl Buckets {
                 self.cells[y * self.n + x].iter().for_each(|&i| visit(i));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::file_testing::dual_layout;
+    use crate::testing::{column, row, torus};
+
+    fn grid_layout() -> (QuadLayout, Embedding) {
+        let curves: Vec<_> =
+            (0..3).flat_map(|k| [row(12, 4 * k, true, 0.4), column(12, 12, 4 * k, true, 0.6)]).collect();
+        dual_layout(&torus(12, 12), &curves)
+    }
+
+    #[test]
+    fn patches_along_a_chord_have_the_same_width() {
+        let (layout, embedding) = grid_layout();
+        let maps = map_patches(&layout, &embedding, &Progress::new()).unwrap();
+        let mut width = vec![None; layout.chords];
+        for (patch, map) in layout.patches.iter().zip(&maps) {
+            for i in 0..2 {
+                let chord = layout.arcs[patch.sides[i].0 as usize].chord as usize;
+                assert_eq!(*width[chord].get_or_insert(map.size[i]), map.size[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn corners_of_the_rectangle_are_located_at_the_nodes() {
+        let (layout, embedding) = grid_layout();
+        let maps = map_patches(&layout, &embedding, &Progress::new()).unwrap();
+        for (patch, map) in layout.patches.iter().zip(&maps) {
+            let corners = [DVec2::ZERO, map.size * DVec2::X, map.size, map.size * DVec2::Y];
+            for (node, (at, _)) in patch.corners.iter().zip(map.locate(&corners)) {
+                let wanted = embedding.mesh.positions[embedding.nodes[*node as usize] as usize];
+                assert!(at.distance(wanted) < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn patch_with_the_sides_of_another_is_refused() {
+        let (mut layout, embedding) = grid_layout();
+        let sides = layout.patches[5].sides;
+        layout.patches[2].sides = sides;
+        let error = map_patches(&layout, &embedding, &Progress::new()).unwrap_err();
+        assert!(matches!(error, PatchError::Shape(PatchShapeError::Sides { patch: 2 })), "{error}");
     }
 }

@@ -251,3 +251,70 @@ impl QuadLayout {
         self.nodes.iter().filter(|n| !n.is_regular()).count()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{column, row, torus};
+
+    /// The layout dual to `m` rows and `n` columns of a torus.
+    fn torus_layout(m: u32, n: u32) -> QuadLayout {
+        let mesh = torus(12, 12);
+        let rows = (0..m).map(|k| row(12, 4 * k, true, 0.4));
+        let curves: Vec<_> = rows.chain((0..n).map(|k| column(12, 12, 4 * k, true, 0.6))).collect();
+        QuadLayout::dual(&Arrangement::new(&mesh, &curves).unwrap(), &[], 0).unwrap()
+    }
+
+    #[test]
+    fn arrangement_without_crossing_has_no_layout() {
+        let arrangement = Arrangement::new(&torus(6, 6), &[row(6, 2, true, 0.5)]).unwrap();
+        assert_eq!(QuadLayout::dual(&arrangement, &[], 0), Err(LayoutError::Empty));
+    }
+
+    #[test]
+    fn regions_that_cannot_be_nodes_are_reported() {
+        let arrangement = Arrangement::new(&torus(6, 6), &[row(6, 2, true, 0.5)]).unwrap();
+        let error = QuadLayout::dual(&arrangement, &[3, 5], 0).unwrap_err();
+        assert_eq!(error, LayoutError::RedRegions(vec![3, 5]));
+        assert!(error.to_string().contains("2 of the regions"), "{error}");
+    }
+
+    #[test]
+    fn layouts_of_another_euler_characteristic_are_refused() {
+        let layout = torus_layout(2, 3);
+        assert_eq!((layout.euler(), layout.check(0)), (0, Ok(())));
+        assert!(matches!(layout.check(2), Err(LayoutError::Euler { found: 0, expected: 2, .. })));
+    }
+
+    #[test]
+    fn sides_that_do_not_join_corners_are_refused() {
+        let mut layout = torus_layout(2, 3);
+        let (arc, forward) = layout.patches[4].sides[2];
+        layout.patches[4].sides[2] = (arc, !forward);
+        assert_eq!(layout.check(0), Err(LayoutError::Patch { patch: 4 }));
+    }
+
+    #[test]
+    fn wrong_valences_are_refused() {
+        let mut layout = torus_layout(2, 3);
+        layout.nodes[1].valence = 5;
+        assert_eq!(layout.check(0), Err(LayoutError::Valence { node: 1, valence: 5, corners: 4 }));
+        assert_eq!((layout.irregularity(), layout.n_irregular()), (1, 1));
+    }
+
+    #[test]
+    fn valence_two_is_regular_on_the_boundary_only() {
+        assert!(Node { valence: 2, boundary: true }.is_regular() && Node { valence: 4, boundary: false }.is_regular());
+        assert!(
+            !Node { valence: 2, boundary: false }.is_regular() && !Node { valence: 4, boundary: true }.is_regular()
+        );
+    }
+
+    #[test]
+    fn loops_and_double_arcs_need_more_quads() {
+        // Around one patch every arc is a loop; around two, arcs come in pairs with the same ends; three are enough.
+        for (n, least) in [(1, 3), (2, 2), (3, 1)] {
+            assert_eq!(torus_layout(n, n).min_quads_per_chord(), vec![least; 2 * n as usize]);
+        }
+    }
+}

@@ -14,7 +14,7 @@ pub(crate) struct Submesh {
     /// The submesh.
     pub mesh: TriMesh,
     /// Vertex of the parent mesh that each vertex of the submesh is a copy of.
-    pub whole: Vec<u32>,
+    pub parent: Vec<u32>,
     /// Index in the submesh of each face of the parent mesh.
     index: HashMap<u32, u32>,
 }
@@ -60,7 +60,7 @@ impl Submesh {
         }
         let positions = copies.iter().map(|&v| parent.positions[v as usize]).collect();
         let triangles: Vec<[u32; 3]> = corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        Ok(Self { mesh: TriMesh::from_faces(positions, &triangles)?, whole: copies, index })
+        Ok(Self { mesh: TriMesh::from_faces(positions, &triangles)?, parent: copies, index })
     }
 
     /// The half-edge of the submesh that is half-edge `h` of the parent mesh.

@@ -110,3 +110,43 @@ fn renumbered(embedding: Embedding, same: &Isomorphism) -> Embedding {
         seeds: same.patches.iter().map(|&p| seeds[p as usize]).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::file_testing::dual_layout;
+    use crate::testing::{column, row, torus};
+
+    #[test]
+    fn layout_is_transferred_with_its_numbering() {
+        let mesh = torus(12, 12);
+        let curves = [row(12, 2, true, 0.4), column(12, 12, 3, true, 0.6), column(12, 12, 8, true, 0.6)];
+        let (layout, embedding) = dual_layout(&mesh, &curves);
+        // The original curves serve as the transferred curves of their chords, in the order of the chords.
+        let arrangement = Arrangement::new(&mesh, &curves).unwrap();
+        let chord_curve = |chord: usize| {
+            let arc = layout.arcs.iter().position(|a| a.chord as usize == chord).unwrap();
+            curves[arrangement.segments[arc].curve as usize].clone()
+        };
+        let next = std::cell::Cell::new(0);
+        let transferred = |_: &DualCurve| {
+            next.set(next.get() + 1);
+            Some(chord_curve(next.get() - 1))
+        };
+        let own = (&layout, &embedding, mesh.n_vertices());
+        let moved = transfer_embedding(own, &mesh, transferred, |_| None, &Progress::new()).unwrap().unwrap();
+        for (arc, path) in layout.arcs.iter().zip(&moved.arcs) {
+            assert_eq!(path[0], moved.nodes[arc.nodes[0] as usize]);
+            assert_eq!(path[path.len() - 1], moved.nodes[arc.nodes[1] as usize]);
+        }
+        assert!(crate::layout::map_patches(&layout, &moved, &Progress::new()).is_ok());
+    }
+
+    #[test]
+    fn layout_with_a_curve_that_cannot_be_transferred_is_not_transferred() {
+        let mesh = torus(12, 12);
+        let (layout, embedding) = dual_layout(&mesh, &[row(12, 2, true, 0.4), column(12, 12, 3, true, 0.6)]);
+        let own = (&layout, &embedding, mesh.n_vertices());
+        assert!(transfer_embedding(own, &mesh, |_| None, |_| None, &Progress::new()).unwrap().is_none());
+    }
+}

@@ -71,25 +71,13 @@ pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<Loade
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use proptest::prelude::*;
 
     use super::*;
     use crate::mesh::Topology;
+    use crate::testing::research_meshes;
 
-    /// The folder of real meshes, if there is one.
-    fn meshes() -> Option<PathBuf> {
-        let folder = std::env::var_os("PLAIT_MESHES")
-            .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/meshes")), PathBuf::from);
-        let found = folder.join("MANIFEST.tsv").is_file();
-        if !found {
-            eprintln!("skipped: no meshes in {}", folder.display());
-        }
-        found.then_some(folder)
-    }
-
-    /// What the list of meshes says of one: file, genus, boundary loops, components, whether it is a manifold.
+    /// A mesh as listed: file, genus, boundary loops, components, whether it is a manifold.
     type Row = (String, Option<usize>, usize, usize, bool);
 
     fn manifest(folder: &Path) -> Vec<Row> {
@@ -104,7 +92,7 @@ mod tests {
 
     #[test]
     fn real_meshes_have_the_listed_topology() {
-        let Some(folder) = meshes() else { return };
+        let Some(folder) = research_meshes() else { return };
         for (file, genus, boundary_loops, components, manifold) in manifest(&folder) {
             let loaded = match load(&folder.join(&file)) {
                 Ok(loaded) => loaded,
@@ -232,7 +220,7 @@ mod tests {
         fn truncated_and_damaged_files_never_panic(
             file in 0usize..64, at in 0.0f64..1.0, damage in prop::collection::vec((0.0f64..1.0, any::<u8>()), 0..4),
         ) {
-            if let Some(folder) = meshes() {
+            if let Some(folder) = research_meshes() {
                 let rows = manifest(&folder);
                 let file = &rows[file % rows.len()].0;
                 let mut bytes = std::fs::read(folder.join(file)).unwrap();

@@ -111,11 +111,11 @@ fn best_of(score: &[f64]) -> usize {
 /// The polygon projected to the plane of its vector area, with positive area there.
 fn flatten(outline: &[u32], positions: &[DVec3]) -> Vec<DVec2> {
     let at = |i: usize| positions[outline[i % outline.len()] as usize];
-    let center = at(0);
-    let normal: DVec3 = (0..outline.len()).map(|i| (at(i) - center).cross(at(i + 1) - center)).sum();
+    let centre = at(0);
+    let normal: DVec3 = (0..outline.len()).map(|i| (at(i) - centre).cross(at(i + 1) - centre)).sum();
     let normal = normal.try_normalize().unwrap_or(DVec3::Z);
     let (u, v) = normal.any_orthonormal_pair();
-    (0..outline.len()).map(|i| DVec2::new((at(i) - center).dot(u), (at(i) - center).dot(v))).collect()
+    (0..outline.len()).map(|i| DVec2::new((at(i) - centre).dot(u), (at(i) - centre).dot(v))).collect()
 }
 
 /// Score of clipping corner `i`: 2 to 3 for an ear with a new diagonal, 1 to 2 for an ear whose diagonal is an edge

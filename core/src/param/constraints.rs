@@ -141,3 +141,22 @@ fn linear_constraint(mesh: &TriMesh, cut: &CutGraph, constraint: &CoordinateCons
     }
     Some(Constraint { terms, rhs: *difference })
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::param::turn;
+
+    #[test]
+    fn turned_components_agree_with_turned_vectors() {
+        let w = DVec2::new(3.0, 5.0);
+        for quarters in -5..6 {
+            for c in 0..2 {
+                let (component, sign) = turned(quarters, c);
+                assert_eq!(sign * w[component as usize], turn(w, quarters)[c as usize], "{quarters} {c}");
+            }
+        }
+    }
+}

@@ -9,7 +9,6 @@
 //! Dependencies: `mesh`, `surface`, `field`, `solve` and `progress`. The module knows nothing of layouts.
 
 mod assembly;
-mod compat;
 mod constraints;
 mod cut_graph;
 mod flip_removal;
@@ -29,9 +28,7 @@ pub use flip_removal::{
     Effort, FlipReason, FlipRemoval, FlippedTriangle, OrientationProblem, OrientedTriangle, remove_flips,
 };
 pub(crate) use injective::EnergyDensity;
-pub use injective::{
-    DistortionWeights, InjectiveEnergy, InjectiveMap, flipped_triangles, flipped_triangles as folds, gradients,
-};
+pub use injective::{DistortionWeights, InjectiveEnergy, InjectiveMap, flipped_triangles, gradients};
 pub use newton_system::NewtonSystem;
 pub use objective::{Objective, Residual, residuals};
 pub use seamless::{CoordinateConstraint, SeamlessMap, Transition, turn};
@@ -74,10 +71,10 @@ pub enum ParamError {
         constraint: usize,
     },
     /// A constraint contradicts the others.
-    #[error("constraint {relation} contradicts the others (residual {residual:e})")]
+    #[error("constraint {constraint} contradicts the others (residual {residual:e})")]
     Conflict {
         /// Its position in the list.
-        relation: usize,
+        constraint: usize,
         /// The coordinate difference that remains.
         residual: f64,
     },

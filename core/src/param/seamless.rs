@@ -107,3 +107,46 @@ impl SeamlessMap {
         (b - a).perp_dot(c - a) <= 0.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn transition(turns: u8, x: f64, y: f64) -> Transition {
+        Transition { turns, translation: DVec2::new(x, y) }
+    }
+
+    #[test]
+    fn inverse_undoes_a_transition() {
+        for turns in 0..4 {
+            let t = transition(turns, 2.0, -3.0);
+            assert_eq!(t.then(&t.inverse()), Transition::IDENTITY);
+            assert_eq!(t.inverse().then(&t), Transition::IDENTITY);
+        }
+    }
+
+    #[test]
+    fn composition_applies_the_first_transition_first() {
+        let (first, second) = (transition(1, 2.0, 0.0), transition(3, 0.0, 5.0));
+        let w = DVec2::new(4.0, 7.0);
+        assert_eq!(first.then(&second).apply(w), second.apply(first.apply(w)));
+        assert_ne!(first.then(&second), second.then(&first));
+    }
+
+    #[test]
+    fn turns_are_counter_clockwise_with_period_four() {
+        let w = DVec2::new(1.0, 2.0);
+        assert_eq!(turn(w, 1), DVec2::new(-2.0, 1.0));
+        assert_eq!(turn(w, -1), turn(w, 3));
+        assert_eq!(turn(w, 2), -w);
+        assert_eq!(turn(w, 8), w);
+    }
+
+    #[test]
+    fn clockwise_and_degenerate_images_are_flipped() {
+        let (o, x, y) = (DVec2::ZERO, DVec2::X, DVec2::Y);
+        let map = SeamlessMap { uv: vec![[o, x, y], [o, y, x], [o, x, 2.0 * x], [o, o, o]], jump: Vec::new() };
+        let flipped: Vec<bool> = (0..4).map(|f| map.is_flipped(FaceId(f))).collect();
+        assert_eq!(flipped, [false, true, true, true]);
+    }
+}

@@ -463,9 +463,7 @@ fn reduce(seams: &Reduction, equalities: &[Constraint]) -> Result<Reduction, Par
     };
     let substituted: Vec<Constraint> = equalities.iter().map(substituted).collect();
     eliminate(&keep, &substituted).map_err(|error| match error {
-        EliminationError::Conflict { constraint, rest } => {
-            ParamError::Conflict { relation: constraint, residual: rest }
-        }
+        EliminationError::Conflict { constraint, rest } => ParamError::Conflict { constraint, residual: rest },
         EliminationError::Malformed { constraint } => ParamError::Malformed { constraint },
     })
 }

@@ -208,10 +208,10 @@ fn conflicting_and_malformed_constraints_are_reported() {
     };
     assert_eq!(with(good[2].clone()), None);
     let off = CoordinateConstraint { difference: good[2].difference + 0.1, ..good[2].clone() };
-    assert!(matches!(with(off), Some(ParamError::Conflict { relation: 2 | 6, .. })));
+    assert!(matches!(with(off), Some(ParamError::Conflict { constraint: 2 | 6, .. })));
     // A point cannot differ from itself.
     let apart = CoordinateConstraint { crossed: vec![], to: good[0].from, difference: 0.1, ..good[0].clone() };
-    assert!(matches!(with(apart), Some(ParamError::Conflict { relation: 6, .. })));
+    assert!(matches!(with(apart), Some(ParamError::Conflict { constraint: 6, .. })));
     let broken = CoordinateConstraint { crossed: good[0].crossed[1..].to_vec(), ..good[0].clone() };
     assert_eq!(with(broken), Some(ParamError::Malformed { constraint: 6 }));
     let nan = CoordinateConstraint { difference: f64::NAN, ..good[0].clone() };
@@ -360,4 +360,46 @@ proptest! {
         system.set_constraints(&mesh, &constraints_off(&mesh, &plain, 4)).unwrap();
         check_transitions(&mesh, &field, &solved(&mut system, &metric, &field).map);
     }
+}
+
+#[test]
+fn cut_torus_is_a_disc() {
+    let mesh = torus(12, 8);
+    let metric = Metric::new(&mesh);
+    let centre = |f| mesh.face_vertices(f).map(|v| mesh.position(v)).iter().sum::<DVec3>();
+    let field = along(&mesh, &metric, |f| DVec3::Z.cross(centre(f)));
+    let cut = CutGraph::new(&mesh, &field, &[]).unwrap();
+    let n_cut: usize = cut.paths.iter().map(|p| p.steps.len()).sum();
+    // Euler characteristic of the cut surface, in which every cut edge occurs twice.
+    assert_eq!(cut.n_wedges as i64 - (mesh.n_edges() + n_cut) as i64 + mesh.n_faces() as i64, 1);
+    assert_eq!(cut.roots.len(), 1);
+}
+
+#[test]
+fn arrays_of_wrong_length_are_refused() {
+    let mesh = square(2);
+    let metric = Metric::new(&mesh);
+    let field = along(&mesh, &metric, |_| DVec3::X);
+    let mut system = SeamlessSystem::new(&mesh, &field, &[], &[]).unwrap();
+    let short = Objective { lengths: vec![[1.0; 2]; 3], ..Objective::default() };
+    let error = system.solve(&metric, &field, &short, &Progress::new()).unwrap_err();
+    assert!(matches!(error, ParamError::WrongLength { got: 3, want: 8, .. }), "{error}");
+    assert!(matches!(system.set_differences(&[0.0]), Err(ParamError::WrongLength { got: 1, want: 0, .. })));
+    assert!(matches!(system.fit(&metric, &field.angle, &[], &[]), Err(ParamError::WrongLength { got: 0, .. })));
+}
+
+#[test]
+fn stiffness_changes_the_map_but_is_not_part_of_the_energy() {
+    let mesh = octasphere(4);
+    let metric = Metric::new(&mesh);
+    let field = feature_aligned_field(&mesh, &metric, None, &[], &Progress::new()).unwrap();
+    let mut system = SeamlessSystem::new(&mesh, &field, &nodes(&field), &[]).unwrap();
+    let plain = solved(&mut system, &metric, &field);
+    let mut solve = |stiffness: Vec<f64>| {
+        let objective = Objective { stiffness, ..Objective::default() };
+        system.solve(&metric, &field, &objective, &Progress::new()).unwrap().energy
+    };
+    assert!((solve(vec![7.0; mesh.n_faces()]) - plain.energy).abs() < 1e-9 * plain.energy);
+    let uneven = solve(mesh.faces().map(|f| if f.0 == 0 { 100.0 } else { 1.0 }).collect());
+    assert!(uneven > plain.energy);
 }

@@ -127,7 +127,7 @@ impl QuadDistances {
 mod tests {
     use super::*;
     use crate::dual::Arrangement;
-    use crate::layout::{embed, map_patches};
+    use crate::layout::{initial_embedding, map_patches};
     use crate::testing::{column, grid, row};
 
     #[test]
@@ -138,7 +138,7 @@ mod tests {
         let arrangement = Arrangement::new(&mesh, &curves).unwrap();
         let layout = QuadLayout::dual(&arrangement, &[], mesh.euler_characteristic()).unwrap();
         let progress = Progress::new();
-        let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
+        let embedding = initial_embedding(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
         let maps = map_patches(&layout, &embedding, &progress).unwrap();
         let embedded = (&layout, &embedding, &maps[..]);
         let error = |spacing: &Spacing| {

@@ -135,7 +135,7 @@ mod tests {
     use super::super::smooth::project;
     use super::*;
     use crate::dual::{Arrangement, Colour, assess, vertex_curvatures};
-    use crate::layout::{embed, map_patches};
+    use crate::layout::{initial_embedding, map_patches};
     use crate::mesh::TriMesh;
     use crate::progress::Progress;
     use crate::surface::SurfaceCurve;
@@ -167,7 +167,7 @@ mod tests {
         assert!(reports.iter().all(|r| r.colour != Colour::Red), "{reports:?}");
         let layout = QuadLayout::dual(&arrangement, &[], mesh.euler_characteristic()).unwrap();
         let progress = Progress::new();
-        let embedding = embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
+        let embedding = initial_embedding(&arrangement, &layout, &vec![None; layout.nodes.len()], &progress).unwrap();
         let maps = map_patches(&layout, &embedding, &progress).unwrap();
         assert!(maps.iter().all(|m| m.flipped == 0));
         (layout, embedding, maps)

@@ -1,8 +1,7 @@
-//! Convex quadratic programs with constraints that put small vectors into circular cones.
+//! Convex quadratic programs over second-order cones of dimension three.
 //!
-//! Minimised is `½ xᵀPx + qᵀx` such that for every constraint of three affine expressions the first is at least the
-//! length of the vector of the other two. Solved by an interior point method (clarabel) on one thread: the same bits
-//! whatever the machine.
+//! Minimised is `½ xᵀPx + qᵀx` subject to `√(b² + c²) ≤ a` for given triples of affine expressions `a, b, c`. Solved by an
+//! interior-point method (clarabel) on one thread, so that results do not depend on the number of cores.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,27 +12,28 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 
 use crate::progress::{Cancelled, Progress};
 
-/// Iterations after which a program is given up; those that have a solution take 10 to 30.
+/// Most iterations; programs with a solution take 10 to 30.
 const MAX_ITERATIONS: u32 = 100;
-/// Programs of fewer constraints end before anybody could cancel them.
-const WATCHED_ABOVE: usize = 2000;
-/// How often the wish to stop is looked at while a program is solved.
-const WATCH_EVERY: Duration = Duration::from_millis(5);
+/// Number of constraints from which on cancellation is checked while solving; smaller programs end before anyone could cancel
+/// them.
+const CANCELLABLE_FROM: usize = 2000;
+/// Time between checks for cancellation.
+const CHECK_INTERVAL: Duration = Duration::from_millis(5);
 
 /// `Σ cᵢ xᵢ + constant`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Affine {
-    /// Variables, none twice, and their coefficients.
+    /// Variables and their coefficients; no variable twice.
     pub terms: Vec<(u32, f64)>,
-    /// What is added.
+    /// The constant.
     pub constant: f64,
 }
 
-/// A convex quadratic program over cones.
+/// A convex quadratic program over second-order cones.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ConeProgram {
-    /// Entries of the positive semidefinite `P` as (row, column, value), on and above the diagonal; equal places are
-    /// summed.
+    /// Entries of the positive semidefinite matrix `P` on and above the diagonal, as (row, column, value); entries of equal
+    /// row and column are summed.
     pub quadratic: Vec<(u32, u32, f64)>,
     /// The vector `q`, one entry per variable.
     pub linear: Vec<f64>,
@@ -42,15 +42,15 @@ pub struct ConeProgram {
 }
 
 impl ConeProgram {
-    /// The minimiser; `None` if there is none or it could not be found. What comes back is to be checked by who
-    /// needs the constraints to hold: they do so up to about 1e-8, for programs whose numbers are of the order of 1.
+    /// The minimiser; `None` if there is none or the method did not converge. Constraints hold up to about 1e-8 if the
+    /// numbers of the program are of the order of 1; a caller that depends on them must check.
     ///
     /// # Errors
     ///
     /// [`Cancelled`].
     pub fn minimise(&self, progress: &Progress) -> Result<Option<Vec<f64>>, Cancelled> {
         progress.check()?;
-        if self.cones.len() < WATCHED_ABOVE {
+        if self.cones.len() < CANCELLABLE_FROM {
             return Ok(self.run(&Arc::new(AtomicBool::new(false))));
         }
         let stop = Arc::new(AtomicBool::new(false));
@@ -58,7 +58,7 @@ impl ConeProgram {
             let worker = scope.spawn(|| self.run(&stop));
             while !worker.is_finished() {
                 stop.store(progress.is_cancelled(), Ordering::Relaxed);
-                std::thread::sleep(WATCH_EVERY);
+                std::thread::sleep(CHECK_INTERVAL);
             }
             worker.join().unwrap_or_default()
         });
@@ -66,10 +66,11 @@ impl ConeProgram {
         Ok(x)
     }
 
+    /// Solves until `stop` is set.
     fn run(&self, stop: &Arc<AtomicBool>) -> Option<Vec<f64>> {
         let n = self.linear.len();
         let quadratic = matrix(n, n, self.quadratic.iter().map(|&(r, c, v)| (r as usize, c as usize, v)));
-        // The solver wants `b − A x` in the cone.
+        // In the form of the solver, `b − A x` lies in the cone.
         let rows = self.cones.iter().flatten().enumerate();
         let negated = rows.flat_map(|(i, row)| row.terms.iter().map(move |&(x, c)| (i, x as usize, -c)));
         let conic = matrix(3 * self.cones.len(), n, negated);
@@ -91,6 +92,7 @@ impl ConeProgram {
     }
 }
 
+/// An `m` by `n` matrix of its entries.
 fn matrix(m: usize, n: usize, entries: impl Iterator<Item = (usize, usize, f64)>) -> CscMatrix<f64> {
     let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for (r, c, v) in entries {
@@ -109,7 +111,7 @@ mod tests {
         Affine { terms: terms.to_vec(), constant }
     }
 
-    /// The point of a disc of radius 1 about the origin that is nearest to (3, 4), in halves of P to test summation.
+    /// The point of a disc around the origin that is closest to (3, 4). One entry of P is given in two halves.
     fn disc(radius: f64) -> ConeProgram {
         ConeProgram {
             quadratic: vec![(0, 0, 0.5), (1, 1, 1.0), (0, 0, 0.5)],
@@ -119,18 +121,18 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_point_of_a_disc_is_found() {
+    fn the_closest_point_of_a_disc_is_found() {
         let x = disc(1.0).minimise(&Progress::new()).unwrap().unwrap();
         assert!((x[0] - 0.6).abs() < 1e-6 && (x[1] - 0.8).abs() < 1e-6, "{x:?}");
     }
 
     #[test]
-    fn what_cannot_be_satisfied_has_no_solution() {
+    fn infeasible_programs_have_no_solution() {
         assert_eq!(disc(-1.0).minimise(&Progress::new()), Ok(None));
     }
 
     #[test]
-    fn cancelled_work_ends() {
+    fn cancellation_is_an_error() {
         let progress = Progress::new();
         progress.cancel();
         assert_eq!(disc(1.0).minimise(&progress), Err(Cancelled));

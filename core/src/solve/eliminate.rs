@@ -1,37 +1,37 @@
-//! Elimination of linear equalities with small coefficients.
+//! Elimination of linear equality constraints with coefficients of the order of 1.
 //!
-//! Constraints `Σ cᵢ xᵢ = b` are used up one at a time, those with the fewest terms first: what is already known
-//! is substituted, one variable is solved for, and what remains are free variables `y` and the exact affine
-//! expression `x = C y + d` of every variable. A constraint that has become `0 = 0` is redundant and dropped, one
-//! that has become `0 = b` is an error. Chains of equalities behave like a union-find: the variable on which fewer
-//! others depend is expressed by the other, and expressions are shortened whenever they are followed.
-//! (Dynamic reordering: Bommes, Quadrilateral Surface Mesh Generation, section 5.2.)
+//! Constraints `Σ cᵢ xᵢ = b` are eliminated one at a time, those with the fewest terms first (dynamic reordering: Bommes,
+//! Quadrilateral Surface Mesh Generation, section 5.2): eliminated variables are substituted and one variable is solved for.
+//! The result is every variable as an affine expression of free variables, `x = C y + d`. A constraint that has become
+//! `0 = 0` is redundant, one that has become `0 = b` a conflict. Chains of equalities are handled as in union-find: of two
+//! variables, the one that fewer others depend on is eliminated, and expressions are compressed when they are followed.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use thiserror::Error;
 
-/// Coefficients below this have cancelled: those given are of the order of 1.
+/// Coefficients of smaller magnitude count as cancelled; given ones are of the order of 1.
 const ZERO: f64 = 1e-9;
-/// A pivot is at least this fraction of the largest coefficient, so that expressions cannot grow much.
-const PIVOT: f64 = 0.4;
-/// A constraint without variables holds if its constant is below this.
+/// Least magnitude of a pivot relative to the largest coefficient of the constraint; bounds the growth of expressions. At 1 only
+/// the largest coefficients could be pivots, at 0 growth is unbounded.
+const MIN_PIVOT: f64 = 0.4;
+/// Largest constant of a constraint without variables that counts as satisfied.
 const CONFLICT: f64 = 1e-6;
 
 /// Why constraints could not be eliminated.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EliminationError {
     /// A constraint contradicts the others.
-    #[error("linear constraint {constraint} contradicts the others (by {rest:e})")]
+    #[error("linear constraint {constraint} contradicts the others (residual {rest:e})")]
     Conflict {
         /// Its position in the list.
         constraint: usize,
         /// What remains of its constant.
         rest: f64,
     },
-    /// A constraint names a variable that does not exist, or a coefficient is not finite.
-    #[error("linear constraint {constraint} is malformed")]
+    /// A constraint has an unknown variable or a number that is not finite.
+    #[error("linear constraint {constraint} has an unknown variable or a number that is not finite")]
     Malformed {
         /// Its position in the list.
         constraint: usize,
@@ -47,10 +47,11 @@ pub struct Constraint {
     pub rhs: f64,
 }
 
-/// Every variable as an affine expression of the free ones.
+/// Every variable as an affine expression of the free ones, in compressed rows.
 #[derive(Debug, Clone)]
 pub struct Reduction {
     n_free: usize,
+    /// Start of each variable's terms in `terms`, and the end of the last.
     start: Vec<u32>,
     terms: Vec<(u32, f64)>,
     constant: Vec<f64>,
@@ -62,7 +63,7 @@ impl Reduction {
         self.n_free
     }
 
-    /// Variable `x` as terms in the free variables and a constant.
+    /// Variable `x`: terms in the free variables, and the constant.
     pub fn expression(&self, x: usize) -> (&[(u32, f64)], f64) {
         (&self.terms[self.start[x] as usize..self.start[x + 1] as usize], self.constant[x])
     }
@@ -72,7 +73,7 @@ impl Reduction {
         self.constant.len()
     }
 
-    /// The same variables in terms of the free ones of `next`, whose variables are the free ones here.
+    /// The composition: the same variables in terms of the free ones of `next`, whose variables are the free ones here.
     pub fn then(&self, next: &Self) -> Self {
         let n = self.constant.len();
         let mut out = Self {
@@ -96,7 +97,7 @@ impl Reduction {
         out
     }
 
-    /// The values of all variables where the free ones are `y`.
+    /// The values of all variables for values `y` of the free ones.
     pub fn expand(&self, y: &[f64]) -> Vec<f64> {
         (0..self.constant.len())
             .map(|x| {
@@ -107,21 +108,22 @@ impl Reduction {
     }
 }
 
-/// An affine expression: variables ascending, none twice.
+/// An affine expression; variables ascending, none twice.
 #[derive(Debug, Clone, Default)]
 struct Affine {
     terms: Vec<(u32, f64)>,
     constant: f64,
 }
 
-/// Eliminates `constraints` among as many variables as `keep` has entries. Where there is a choice, the variable
-/// with the smaller `keep` goes.
+/// Eliminates `constraints` on as many variables as `keep` has entries. Of the possible pivots the variable with the smallest
+/// `keep` is eliminated first.
 ///
 /// # Errors
 ///
 /// See [`EliminationError`].
 pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, EliminationError> {
-    let mut work = Work { known: vec![None; keep.len()], weight: keep.iter().map(|&k| u64::from(k)).collect() };
+    let mut elimination =
+        Elimination { known: vec![None; keep.len()], weight: keep.iter().map(|&k| u64::from(k)).collect() };
     let mut queue = BinaryHeap::with_capacity(constraints.len());
     for (i, c) in constraints.iter().enumerate() {
         if !c.rhs.is_finite() || c.terms.iter().any(|&(v, a)| v as usize >= keep.len() || !a.is_finite()) {
@@ -130,28 +132,32 @@ pub fn eliminate(keep: &[u32], constraints: &[Constraint]) -> Result<Reduction, 
         queue.push(Reverse((c.terms.len(), i)));
     }
     while let Some(Reverse((count, i))) = queue.pop() {
-        let rest = work.substitute(&Affine { terms: constraints[i].terms.clone(), constant: -constraints[i].rhs });
+        let rest =
+            elimination.substitute(&Affine { terms: constraints[i].terms.clone(), constant: -constraints[i].rhs });
         if rest.terms.is_empty() {
             if rest.constant.abs() > CONFLICT {
                 return Err(EliminationError::Conflict { constraint: i, rest: rest.constant });
             }
         } else if rest.terms.len() > count {
+            // Substitution has made it longer: shorter constraints come first.
             queue.push(Reverse((rest.terms.len(), i)));
         } else {
-            work.solve_for_one(&rest);
+            elimination.solve_for_one(&rest);
         }
     }
-    Ok(work.finish())
+    Ok(elimination.finish())
 }
 
-struct Work {
+/// The state between constraints.
+struct Elimination {
+    /// The expressions of eliminated variables; their own variables may be eliminated since.
     known: Vec<Option<Affine>>,
-    /// How many variables depend on this one, counted generously.
+    /// `keep`, plus an upper bound of that of all variables that depend on this one.
     weight: Vec<u64>,
 }
 
-impl Work {
-    /// Replaces all known variables until only free ones remain.
+impl Elimination {
+    /// Substitutes all eliminated variables, so that only free ones remain.
     fn substitute(&mut self, from: &Affine) -> Affine {
         let mut terms = Vec::with_capacity(from.terms.len() + 2);
         let mut constant = from.constant;
@@ -160,7 +166,7 @@ impl Work {
                 terms.push((v, a));
                 continue;
             }
-            self.shorten(v);
+            self.compress(v);
             if let Some(known) = &self.known[v as usize] {
                 terms.extend(known.terms.iter().map(|&(w, b)| (w, a * b)));
                 constant += a * known.constant;
@@ -169,9 +175,9 @@ impl Work {
         Affine { terms: collect(terms), constant }
     }
 
-    /// Makes the expression of a known variable one of free variables only.
-    fn shorten(&mut self, v: u32) {
-        // Depth first with an own stack: a chain of expressions may be long.
+    /// Substitutes eliminated variables in the expression of one, so that only free ones remain in it.
+    fn compress(&mut self, v: u32) {
+        // Depth first on an explicit stack: chains of expressions may be long.
         let mut stack = vec![v];
         while let Some(&v) = stack.last() {
             let Some(known) = &self.known[v as usize] else {
@@ -207,10 +213,11 @@ impl Work {
         }
     }
 
+    /// Solves a constraint (left-hand side of `= 0`) for its pivot.
     fn solve_for_one(&mut self, rest: &Affine) {
         let largest = rest.terms.iter().map(|t| t.1.abs()).fold(0.0, f64::max);
-        let fit = rest.terms.iter().filter(|t| t.1.abs() >= PIVOT * largest);
-        let Some(&(pivot, a)) = fit.min_by_key(|t| (self.weight[t.0 as usize], t.0)) else { return };
+        let possible = rest.terms.iter().filter(|t| t.1.abs() >= MIN_PIVOT * largest);
+        let Some(&(pivot, a)) = possible.min_by_key(|t| (self.weight[t.0 as usize], t.0)) else { return };
         let terms: Vec<_> = rest.terms.iter().filter(|t| t.0 != pivot).map(|&(v, c)| (v, -c / a)).collect();
         for &(v, _) in &terms {
             self.weight[v as usize] += self.weight[pivot as usize];
@@ -218,6 +225,7 @@ impl Work {
         self.known[pivot as usize] = Some(Affine { terms, constant: -rest.constant / a });
     }
 
+    /// Numbers the free variables in order.
     fn finish(mut self) -> Reduction {
         let n = self.known.len();
         let mut index = vec![0u32; n];
@@ -230,7 +238,7 @@ impl Work {
         }
         let mut out = Reduction { n_free: n_free as usize, start: vec![0], terms: Vec::new(), constant: vec![0.0; n] };
         for v in 0..n {
-            self.shorten(v as u32);
+            self.compress(v as u32);
             match &self.known[v] {
                 None => out.terms.push((index[v], 1.0)),
                 Some(known) => {
@@ -244,7 +252,7 @@ impl Work {
     }
 }
 
-/// Sorts terms, sums those of one variable and drops what cancels.
+/// Sorts terms by variable, sums those of the same variable, and drops those that cancel.
 fn collect(mut terms: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     terms.sort_by_key(|t| t.0);
     let mut out: Vec<(u32, f64)> = Vec::with_capacity(terms.len());
@@ -269,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_chain_becomes_one_variable() {
+    fn a_long_chain_has_one_free_variable() {
         let n = 20_000;
         let chain: Vec<_> = (1..n).map(|i| constraint(&[(i, 1.0), (i - 1, 1.0)], 0.0)).collect();
         let r = eliminate(&vec![1; n as usize], &chain).unwrap();
@@ -279,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn redundant_constraints_are_dropped_and_conflicts_named() {
+    fn redundant_constraints_are_dropped_and_conflicts_are_errors() {
         let mut list = vec![constraint(&[(0, 1.0), (1, -1.0)], 1.0), constraint(&[(1, 1.0), (2, -1.0)], 1.0)];
         list.push(constraint(&[(0, 1.0), (2, -1.0)], 2.0));
         let r = eliminate(&[1; 3], &list).unwrap();
@@ -292,23 +300,107 @@ mod tests {
         );
     }
 
+    /// The rank of the left-hand sides, by Gaussian elimination with full rows.
+    fn rank(n: usize, list: &[Constraint]) -> usize {
+        let row = |c: &Constraint| {
+            let mut row = vec![0.0; n];
+            c.terms.iter().for_each(|&(v, a)| row[v as usize] += a);
+            row
+        };
+        let mut rows: Vec<Vec<f64>> = list.iter().map(row).collect();
+        let mut rank = 0;
+        for column in 0..n {
+            let Some(best) =
+                (rank..rows.len()).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))
+            else {
+                break;
+            };
+            if rows[best][column].abs() < 1e-6 {
+                continue;
+            }
+            rows.swap(rank, best);
+            let pivot = rows[rank].clone();
+            for row in &mut rows[rank + 1..] {
+                let factor = row[column] / pivot[column];
+                row.iter_mut().zip(&pivot).for_each(|(r, p)| *r -= factor * p);
+            }
+            rank += 1;
+        }
+        rank
+    }
+
+    const N: usize = 12;
+
+    /// Up to twelve constraints of up to three terms that the solution returned with them satisfies.
+    fn consistent() -> impl Strategy<Value = (Vec<f64>, Vec<Constraint>)> {
+        let solution = prop::collection::vec(-3i32..=3, N);
+        let terms = (0u32..12, 0u32..12, 0u32..12, -2i32..=2, 1i32..=2);
+        (solution, prop::collection::vec(terms, 0..12)).prop_map(|(solution, terms)| {
+            let x: Vec<f64> = solution.into_iter().map(f64::from).collect();
+            let list = terms
+                .into_iter()
+                .map(|(a, b, c, p, q)| {
+                    let terms = [(a, 1.0), (b, f64::from(p)), (c, f64::from(q))];
+                    constraint(&terms, terms.iter().map(|&(v, a)| a * x[v as usize]).sum())
+                })
+                .collect();
+            (x, list)
+        })
+    }
+
+    fn violation(list: &[Constraint], x: &[f64]) -> f64 {
+        let size = x.iter().fold(1.0f64, |m, v| m.max(v.abs()));
+        let left = |c: &Constraint| c.terms.iter().map(|&(v, a)| a * x[v as usize]).sum::<f64>();
+        list.iter().map(|c| (left(c) - c.rhs).abs() / size).fold(0.0, f64::max)
+    }
+
+    /// The values of the free variables in `x`.
+    fn free_values(r: &Reduction, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![f64::NAN; r.n_free()];
+        for (v, &x) in x.iter().enumerate() {
+            if let (&[(free, 1.0)], 0.0) = r.expression(v) {
+                // Another variable may equal a free one.
+                y[free as usize] = x;
+            }
+        }
+        y
+    }
+
     proptest! {
         #[test]
-        fn every_expansion_satisfies_all_constraints(
-            seeds in prop::collection::vec((0u32..12, 0u32..12, 0u32..12, -2i32..=2, 1i32..=2), 0..12),
-        ) {
-            let list: Vec<_> = seeds
-                .iter()
-                .map(|&(a, b, c, p, q)| constraint(&[(a, 1.0), (b, f64::from(p)), (c, f64::from(q))], 0.0))
-                .collect();
-            let r = eliminate(&[1; 12], &list).unwrap();
+        fn expansions_are_all_solutions((x, list) in consistent()) {
+            let r = eliminate(&[1; N], &list).unwrap();
+            prop_assert_eq!(r.n_free(), N - rank(N, &list));
             let y: Vec<f64> = (0..r.n_free()).map(|i| 1.0 + i as f64 * 0.37).collect();
-            let x = r.expand(&y);
-            let size = x.iter().fold(1.0f64, |m, v| m.max(v.abs()));
-            for c in &list {
-                let sum: f64 = c.terms.iter().map(|&(v, a)| a * x[v as usize]).sum();
-                prop_assert!(sum.abs() < 1e-6 * size);
-            }
+            prop_assert!(violation(&list, &r.expand(&y)) < 1e-6);
+            let again = r.expand(&free_values(&r, &x));
+            prop_assert!(again.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-6), "{again:?}");
+        }
+
+        #[test]
+        fn composed_reductions_satisfy_both_lists((x, list) in consistent(), split in 0usize..12) {
+            let (first, second) = list.split_at(split.min(list.len()));
+            let r = eliminate(&[1; N], first).unwrap();
+            // The second list in terms of the free variables of the first.
+            let substituted: Vec<Constraint> = second
+                .iter()
+                .map(|c| {
+                    let mut terms = Vec::new();
+                    let mut rhs = c.rhs;
+                    for &(v, a) in &c.terms {
+                        let (inner, constant) = r.expression(v as usize);
+                        terms.extend(inner.iter().map(|&(y, b)| (y, a * b)));
+                        rhs -= a * constant;
+                    }
+                    Constraint { terms, rhs }
+                })
+                .collect();
+            let both = r.then(&eliminate(&vec![1; r.n_free()], &substituted).unwrap());
+            prop_assert_eq!(both.n_free(), N - rank(N, &list));
+            let y: Vec<f64> = (0..both.n_free()).map(|i| 1.0 + i as f64 * 0.37).collect();
+            prop_assert!(violation(&list, &both.expand(&y)) < 1e-6);
+            let again = both.expand(&free_values(&both, &x));
+            prop_assert!(again.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-6), "{again:?}");
         }
     }
 }

@@ -1,7 +1,6 @@
-//! Linear solving: sparse positive definite systems, the elimination of linear equalities, quadratic programs over
-//! cones.
+//! Numerics: sparse Hermitian positive definite systems, elimination of linear equalities, second-order cone programs.
 //!
-//! The room for numerics that know nothing of meshes. Of this crate it may use nothing but `progress`.
+//! Nothing here knows meshes. Of this crate the room uses `progress` only.
 
 mod cone;
 mod eliminate;

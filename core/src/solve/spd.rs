@@ -1,9 +1,9 @@
-//! Sparse Hermitian positive definite systems, real or complex.
+//! Sparse Hermitian positive definite systems, real or complex, by Cholesky factorisation (faer).
 //!
-//! A matrix is assembled from triplets of its lower triangle, analysed once for its pattern (fill-reducing
-//! order and supernodes, by faer), factored as often as its values change and solved as often as wanted. Every
-//! solution is checked against the matrix and refined once if need be, so that what comes back is either finite
-//! and of small residual or an error. Factors are computed by one thread: the same bits whatever the machine.
+//! A matrix is assembled from triplets of its lower triangle. The symbolic analysis (fill-reducing order, supernodes) is made
+//! once per pattern, the factorisation once per change of values. The residual of every solution is checked; if it is too
+//! large, one step of iterative refinement is made, and if it is still too large, the result is an error. Factorisation runs
+//! on one thread, so that results do not depend on the number of cores.
 
 use std::ops::{AddAssign, Mul, Sub};
 use std::sync::Arc;
@@ -20,10 +20,10 @@ use faer::traits::ComplexField;
 use faer::{Conj, MatMut, Par, Side};
 use thiserror::Error;
 
-/// Relative residual above which a solution is refined.
+/// Relative residual (maximum norm) above which a solution is refined; chosen by hand.
 const REFINE_ABOVE: f64 = 1e-11;
-/// Relative residual above which a solution is refused: far above what a positive definite system of usable
-/// condition leaves, far below what one could see.
+/// Relative residual (maximum norm) above which a solution is an error: far above that of well-conditioned systems, far below
+/// a visible error. Chosen by hand.
 const REFUSE_ABOVE: f64 = 1e-5;
 
 /// Why a system could not be solved.
@@ -35,24 +35,24 @@ pub enum SolveError {
     /// A pivot is not positive.
     #[error("the matrix is not positive definite (unknown {unknown})")]
     NotPositiveDefinite {
-        /// The unknown, in the order of elimination, whose pivot failed.
+        /// The unknown whose pivot failed, in the order of elimination.
         unknown: usize,
     },
-    /// The factorization could not be set up, for want of memory or index range.
+    /// The system needs more memory or larger indices than there are.
     #[error("the linear system is too large: {0}")]
     TooLarge(String),
-    /// The pattern is not the one that was analysed, or a right-hand side has the wrong length.
-    #[error("the linear system does not have the analysed shape")]
+    /// The pattern is not the analysed one, or a right-hand side has the wrong length.
+    #[error("the linear system does not have the size or pattern that was analysed")]
     WrongShape,
-    /// The solution does not satisfy the system.
-    #[error("the solution leaves a relative residual of {residual:e}")]
+    /// The residual of the solution is too large.
+    #[error("the solution of the linear system has a relative residual of {residual:e}")]
     Residual {
         /// Residual over right-hand side, in the maximum norm.
         residual: f64,
     },
 }
 
-/// A number that a system may be made of.
+/// A field of numbers: real or complex.
 pub trait Scalar: ComplexField + Copy + AddAssign + Sub<Output = Self> + Mul<Output = Self> {
     /// Zero.
     const ZERO: Self;
@@ -82,7 +82,7 @@ impl Scalar for c64 {
     }
 }
 
-/// The lower triangle of a sparse Hermitian matrix, column by column, rows ascending.
+/// The lower triangle of a sparse Hermitian matrix, in compressed columns with ascending rows.
 #[derive(Debug, Clone)]
 pub struct SparseHermitian<T> {
     col_start: Vec<u32>,
@@ -91,7 +91,7 @@ pub struct SparseHermitian<T> {
 }
 
 impl SparseHermitian<f64> {
-    /// Makes every stored entry of the diagonal larger by a share of its own.
+    /// Multiplies every stored diagonal entry by `1 + share`.
     pub fn raise_diagonal(&mut self, share: f64) {
         for c in 0..self.n() {
             let first = self.col_start[c] as usize;
@@ -103,8 +103,8 @@ impl SparseHermitian<f64> {
 }
 
 impl<T: Scalar> SparseHermitian<T> {
-    /// Sums `triplets` (row, column, value) into an `n` by `n` matrix. An entry above the diagonal is mirrored, so
-    /// each pair of off-diagonal entries is to be given once. The order of summation is that of the triplets.
+    /// The `n` by `n` matrix of `triplets` (row, column, value), summed in the order given. An entry above the diagonal stands
+    /// for its conjugate below, so that each pair of off-diagonal entries is to be given once.
     pub fn from_triplets(n: usize, triplets: &[(u32, u32, T)]) -> Self {
         let (mut matrix, slot) = Self::zero(n, triplets.len(), || triplets.iter().map(|&(r, c, _)| (r, c)));
         for (&(r, c, v), k) in triplets.iter().zip(slot) {
@@ -113,8 +113,8 @@ impl<T: Scalar> SparseHermitian<T> {
         matrix
     }
 
-    /// The `n` by `n` matrix that is zero but has room for `count` entries (row, column), and where in
-    /// [`Self::values_mut`] each of them is. An entry above the diagonal has the place of its mirror image.
+    /// The zero `n` by `n` matrix with the pattern of `count` entries (row, column), and the index of each of these in
+    /// [`Self::values_mut`]. An entry above the diagonal has the index of its mirror image.
     pub fn zero<I>(n: usize, count: usize, entries: impl Fn() -> I) -> (Self, Vec<u32>)
     where
         I: Iterator<Item = (u32, u32)>,
@@ -163,7 +163,7 @@ impl<T: Scalar> SparseHermitian<T> {
         &mut self.value
     }
 
-    /// Whether both have room for the same entries, so that one [`SpdSymbolic`] serves both.
+    /// Whether both have the same pattern, so that one [`SpdSymbolic`] serves both.
     pub fn same_pattern<U>(&self, other: &SparseHermitian<U>) -> bool {
         self.col_start == other.col_start && self.row == other.row
     }
@@ -193,7 +193,7 @@ impl<T: Scalar> SparseHermitian<T> {
     }
 }
 
-/// What is known of a system from its pattern alone: a fill-reducing order and the shape of its factor.
+/// The symbolic analysis of a pattern: a fill-reducing order and the pattern of the factor.
 #[derive(Debug, Clone)]
 pub struct SpdSymbolic {
     inner: Arc<SymbolicCholesky<u32>>,
@@ -201,14 +201,14 @@ pub struct SpdSymbolic {
 }
 
 impl SpdSymbolic {
-    /// Analyses the pattern of `matrix`; serves every matrix of the same pattern.
+    /// Analyses the pattern of `matrix`; the result serves every matrix of the same pattern.
     ///
     /// # Errors
     ///
     /// [`SolveError::TooLarge`].
     pub fn new<T: Scalar>(matrix: &SparseHermitian<T>) -> Result<Self, SolveError> {
-        // On meshes of ten thousand vertices the supernodal factorization is many times faster; on small ones the
-        // two do not differ noticeably.
+        // On meshes of ten thousand vertices supernodal factorisation is many times faster; on small ones the two hardly
+        // differ.
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -256,7 +256,7 @@ pub struct SpdFactor<T> {
 }
 
 impl<T: Scalar> SpdFactor<T> {
-    /// Analyses and factors in one go.
+    /// Analyses and factors.
     ///
     /// # Errors
     ///
@@ -295,6 +295,7 @@ impl<T: Scalar> SpdFactor<T> {
         if residual <= REFUSE_ABOVE { Ok(x) } else { Err(SolveError::Residual { residual }) }
     }
 
+    /// Forward and backward substitution in place.
     fn substitute(&self, x: &mut [T]) {
         let inner = &*self.symbolic.inner;
         if x.is_empty() {
@@ -311,11 +312,12 @@ impl<T: Scalar> SpdFactor<T> {
     }
 }
 
+/// `rhs − matrix x`.
 fn residual<T: Scalar>(matrix: &SparseHermitian<T>, x: &[T], rhs: &[T]) -> Vec<T> {
     matrix.multiply(x).iter().zip(rhs).map(|(&y, &b)| b - y).collect()
 }
 
-/// The largest magnitude; not a number if any is not.
+/// The largest magnitude; NaN if any is NaN.
 fn max_norm<T: Scalar>(x: &[T]) -> f64 {
     x.iter().map(|v| v.magnitude()).fold(0.0, |m, v| if v > m || v.is_nan() { v } else { m })
 }
@@ -371,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_solved_is_refused() {
+    fn systems_without_a_solution_are_errors() {
         let indefinite = SparseHermitian::from_triplets(2, &[(0, 0, 1.0), (1, 0, 2.0), (1, 1, 1.0)]);
         assert!(matches!(SpdFactor::new(&indefinite), Err(SolveError::NotPositiveDefinite { .. })));
         let broken = SparseHermitian::from_triplets(1, &[(0, 0, f64::NAN)]);

@@ -1,7 +1,10 @@
-//! Checks of the strip map on shapes whose curves run along edges.
+//! Strip maps of shapes whose curves run along edges.
 
 use super::*;
+use crate::field::FieldError;
 use crate::field::samples::*;
+use crate::mesh::TriMesh;
+use crate::progress::Progress;
 
 fn map(mesh: &TriMesh, curves: &[Option<u32>]) -> StripMap {
     StripMap::new(mesh, curves, &Progress::new()).unwrap()
@@ -61,9 +64,9 @@ fn three_great_circles_of_a_sphere() {
     assert!(flipped * 50 < mesh.n_faces(), "{flipped} of {}", mesh.n_faces());
     // By symmetry all strips are alike on both sides, and end at the singularities.
     for s in &map.strips {
-        for b in s.bounds {
-            assert!(b > 0.1 && b < 0.25, "{:?}", s.bounds);
-            assert!((b - s.bounds[0]).abs() < 0.02);
+        for b in s.widths {
+            assert!(b > 0.1 && b < 0.25, "{:?}", s.widths);
+            assert!((b - s.widths[0]).abs() < 0.02);
         }
     }
     let doubly = map.covered.iter().filter(|c| c[0].is_some() && c[1].is_some()).count();
@@ -71,7 +74,7 @@ fn three_great_circles_of_a_sphere() {
 }
 
 #[test]
-fn stripes_are_continuous_and_zero_on_their_curve() {
+fn spine_distances_vanish_on_the_curve_only() {
     let mesh = octasphere(10);
     let mut curves = Vec::new();
     for axis in 0..3 {
@@ -82,7 +85,7 @@ fn stripes_are_continuous_and_zero_on_their_curve() {
     for f in mesh.faces() {
         for family in 0..2 {
             let Some(strip) = map.covered[f.index()][family] else { continue };
-            for (v, d) in mesh.face_vertices(f).into_iter().zip(map.stripe[f.index()][family]) {
+            for (v, d) in mesh.face_vertices(f).into_iter().zip(map.spine_distance[f.index()][family]) {
                 let height = mesh.position(v)[map.strips[strip as usize].curve as usize];
                 if height.abs() < 1e-9 {
                     met += 1;
@@ -146,7 +149,7 @@ fn without_curves_there_is_a_map_but_no_strip() {
 }
 
 #[test]
-fn a_curve_that_crosses_itself_and_cuts_along_curves() {
+fn curves_may_cross_themselves_and_coincide_with_cuts() {
     // The meridian and the outer equator as one curve, and both sides of a cube of which every edge is a curve.
     let torus = torus(48, 12);
     let mut curves = Vec::new();
@@ -167,7 +170,7 @@ fn a_curve_that_crosses_itself_and_cuts_along_curves() {
     // The cube is the product of its three loops: the map is an isometry and covers it twice.
     assert!(!cube_map.flipped.contains(&true));
     for s in &cube_map.strips {
-        assert!(s.bounds.iter().all(|b| (b - 0.1).abs() < 1e-6), "{:?}", s.bounds);
+        assert!(s.widths.iter().all(|b| (b - 0.1).abs() < 1e-6), "{:?}", s.widths);
     }
     assert!(cube_map.covered.iter().all(|c| c[0].is_some() && c[1].is_some()));
     for f in cube.faces() {
@@ -201,7 +204,7 @@ fn one_thread_and_two_agree_to_the_bit() {
     let with = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| map(&sphere, &curves));
     let (one, two) = (with(1), with(2));
     assert_eq!(one.uv, two.uv);
-    assert_eq!(one.stripe, two.stripe);
+    assert_eq!(one.spine_distance, two.spine_distance);
     assert_eq!(one.covered, two.covered);
 }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::dual::{Arrangement, RegionReport, assess, remove_bigons, vertex_curvatures};
 use crate::embed::{EmbeddingError, Next, OptimisedEmbedding, Problem, Settings, Snapshot, arc_headings};
-use crate::layout::{Embedding, Part, QuadLayout, embed};
+use crate::layout::{Embedding, LayoutElement, QuadLayout, initial_embedding};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 use crate::surface::SurfaceCurve;
@@ -43,10 +43,10 @@ impl PinnedParts {
     /// [`WeaveError::NoPart`] if there is no such node or arc.
     pub fn pin(&mut self, nodes: &[usize], arcs: &[usize]) -> Result<(), WeaveError> {
         for &i in nodes {
-            *self.nodes.get_mut(i).ok_or(WeaveError::NoPart(Part::Node(i as u32)))? = true;
+            *self.nodes.get_mut(i).ok_or(WeaveError::NoPart(LayoutElement::Node(i as u32)))? = true;
         }
         for &i in arcs {
-            *self.arcs.get_mut(i).ok_or(WeaveError::NoPart(Part::Arc(i as u32)))? = true;
+            *self.arcs.get_mut(i).ok_or(WeaveError::NoPart(LayoutElement::Arc(i as u32)))? = true;
         }
         Ok(())
     }
@@ -127,7 +127,7 @@ pub(in crate::weave) fn embedded_dual(
 ) -> Result<(QuadLayout, Embedding), WeaveError> {
     let layout = QuadLayout::dual(arrangement, &red_regions(reports), place.mesh.euler_characteristic())?;
     let preferred = preferred_nodes(arrangement, &layout, reports, place);
-    let embedding = embed(arrangement, &layout, &preferred, progress)?;
+    let embedding = initial_embedding(arrangement, &layout, &preferred, progress)?;
     Ok((layout, embedding))
 }
 

@@ -6,7 +6,9 @@ use crate::dual::ArrangementError;
 use crate::elastica::ElasticaError;
 use crate::embed::EmbeddingError;
 use crate::field::FieldError;
-use crate::layout::{InitialEmbeddingError, LayoutError, LayoutFileError, Part, PartialEmbeddingError, PatchError};
+use crate::layout::{
+    InitialEmbeddingError, LayoutElement, LayoutError, LayoutFileError, PartialEmbeddingError, PatchError,
+};
 use crate::mesh::LoadError;
 use crate::progress::Cancelled;
 use crate::proxy::CurveTransferError;
@@ -59,7 +61,7 @@ pub enum WeaveError {
     Incomplete,
     /// There is no such node or arc.
     #[error("the layout has no {0}")]
-    NoPart(Part),
+    NoPart(LayoutElement),
     /// No strip can be suggested.
     #[error(transparent)]
     NoSuggestion(#[from] NoSuggestion),

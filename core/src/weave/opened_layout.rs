@@ -48,7 +48,7 @@ impl OpenedLayout {
             let full = folder.join(&*mesh);
             *mesh = full.canonicalize().unwrap_or(full);
         }
-        let initial_embedding = file.draw(&loaded.mesh)?;
+        let initial_embedding = file.partial_embedding(&loaded.mesh)?;
         progress.check()?;
         let (layout, embedding) = initial_embedding.to_embedding()?;
         let mut pinned = PinnedParts {

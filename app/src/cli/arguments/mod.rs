@@ -172,22 +172,43 @@ mod tests {
         Arguments::command().debug_assert();
     }
 
+    fn weave(line: &str) -> WeaveArguments {
+        match parse(line).unwrap().command {
+            Some(Command::Weave(weave)) => weave,
+            other => panic!("{other:?}"),
+        }
+    }
+
     #[test]
-    fn a_file_and_commands_are_told_apart() {
-        assert_eq!(parse("plait bunny.obj").unwrap().file, Some("bunny.obj".into()));
+    fn a_file_without_a_command_opens_the_window() {
+        let arguments = parse("plait bunny.obj").unwrap();
+        assert!(arguments.file == Some("bunny.obj".into()) && arguments.command.is_none());
         assert!(matches!(parse("plait info bunny.obj --json").unwrap().command, Some(Command::Info(i)) if i.json));
-        let weave = parse("plait weave cube --suggest --until orange --out x --quads 500").unwrap();
-        let Some(Command::Weave(weave)) = weave.command else { panic!("not weave") };
+    }
+
+    #[test]
+    fn the_goal_of_suggestions_is_read() {
+        let weave = weave("plait weave cube --suggest --until orange --out x --quads 500");
         assert_eq!((weave.until, weave.size.quads), (Until::Orange, Some(500)));
-        let detail = parse("plait weave cube --suggest --out x --proxy 9000 --smoothing 0.02").unwrap();
-        let Some(Command::Weave(WeaveArguments { detail, .. })) = detail.command else { panic!("not weave") };
+    }
+
+    #[test]
+    fn options_that_are_not_given_keep_their_values() {
+        let detail = weave("plait weave cube --suggest --out x --proxy 9000 --smoothing 0.02").detail;
         let defaults = Options::default();
         assert_eq!(detail.over(defaults), Options { proxy: 9000, smoothing: 0.02, ..defaults });
-        for (text, rounds) in [("--improve --out x", None), ("--improve 7 --out x", Some(7))] {
-            let weave = parse(&format!("plait weave cube --suggest {text}")).unwrap();
-            let Some(Command::Weave(weave)) = weave.command else { panic!("not weave") };
-            assert_eq!(weave.improve, Some(rounds));
+    }
+
+    #[test]
+    fn the_number_of_rounds_may_be_left_out() {
+        for (text, rounds) in [("", None), ("--improve", Some(None)), ("--improve 7", Some(Some(7)))] {
+            let line = format!("plait weave cube --suggest --out x {text}");
+            assert_eq!(weave(line.trim_end()).improve, rounds);
         }
+    }
+
+    #[test]
+    fn pins_are_lists_of_numbers() {
         let embed = parse("plait embed a.layout --out x --pin-nodes 1,2 --edge-length 0.1 --steps 3").unwrap();
         let Some(Command::Embed(embed)) = embed.command else { panic!("not embed") };
         assert_eq!((embed.pin_nodes, embed.size.edge_length, embed.steps), (vec![1, 2], Some(0.1), Some(3)));
@@ -199,7 +220,13 @@ mod tests {
         assert!(parse("plait weave a --out x --until orange").is_err());
         assert!(parse("plait embed a --out x --pin-nodes 1,b").is_err());
         assert!(parse("plait weave a --out x --curvature-radius 3").is_err());
-        assert!(parse("plait render a --out x.png --size 10x10").is_err());
+    }
+
+    #[test]
+    fn sizes_of_pictures_have_bounds() {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
+        for text in ["10x10", "640", "640x9000", "axb"] {
+            assert!(parse_size(text).is_err(), "{text}");
+        }
     }
 }

@@ -63,3 +63,13 @@ fn field(path: &str, name: &str) -> Option<String> {
 fn kilobytes(text: &str) -> Option<u64> {
     text.strip_suffix("kB")?.trim().parse::<u64>().ok().map(|n| n * 1024)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_read_in_kilobytes() {
+        assert_eq!((kilobytes("2 kB"), kilobytes("2 MB"), kilobytes("kB")), (Some(2048), None, None));
+    }
+}

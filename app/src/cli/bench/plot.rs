@@ -213,4 +213,17 @@ mod tests {
         assert!(picture.split("cy=\"").skip(1).map(coordinate).all(|y| (TOP..=BOTTOM).contains(&y)));
         assert!(svg(&[Report::new(1)]).is_err());
     }
+
+    #[test]
+    fn axes_end_at_round_values() {
+        let axis = Axis::over([3.0, 700.0].into_iter(), 0.0, 100.0);
+        assert_eq!((axis.low, axis.high), (2.0, 1000.0));
+        assert!(axis.at(2.0).abs() < 1e-9 && (axis.at(1000.0) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_single_value_has_an_axis() {
+        let axis = Axis::over([5.0].into_iter(), 0.0, 1.0);
+        assert!(axis.high > axis.low && axis.at(5.0).is_finite());
+    }
 }

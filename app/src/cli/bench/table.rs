@@ -121,4 +121,10 @@ mod tests {
         assert_eq!(table.lines().filter(|l| l.contains("threads")).count(), 1);
         assert!(text(&report).contains("a loop shown"));
     }
+
+    #[test]
+    fn numbers_have_three_digits_or_all_before_the_point() {
+        let texts = [0.0, 0.1234, 1.234, 12.34, 12345.6].map(figure);
+        assert_eq!(texts, ["0", "0.123", "1.23", "12.3", "12346"]);
+    }
 }

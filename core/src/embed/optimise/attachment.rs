@@ -234,11 +234,11 @@ impl Optimiser<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embed::topology::testing::net;
+    use crate::embed::topology::testing::sample_topology;
 
     #[test]
     fn distance_of_a_point_from_an_edge() {
-        let halfedge = net().mesh.halfedges().next().unwrap();
+        let halfedge = sample_topology().mesh.halfedges().next().unwrap();
         let at = |along: f64, far: f64| Foot { halfedge, along, far, length: 2.0 };
         assert_eq!(at(0.3, 0.5).distance(), 0.5);
         assert!(at(0.3, 0.5).is_inside() && !at(1.2, 0.0).is_inside());

@@ -152,11 +152,11 @@ impl Optimiser<'_> {
     pub(super) fn converge_map(&mut self, progress: &Progress) -> Result<(), EmbeddingError> {
         let penalised = self.penalised_edges();
         let (Some(system), Some(distortion)) = (&mut self.systems.map, self.distortion) else { return Ok(()) };
-        let newton = system.newton()?;
+        let newton = system.newton_system()?;
         let State { metric, field, objective, anisotropy_share, solution, .. } = &self.state;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (distortion, anisotropy_share))
             .with_isoline_penalties(&penalised);
-        let Some(mut at) = system.injective(&energy, solution.free.clone()) else { return Ok(()) };
+        let Some(mut at) = system.injective_map(&energy, solution.free.clone()) else { return Ok(()) };
         system.descend(&newton, &energy, &mut at, NEWTON_STEPS, progress)?;
         self.state.solution = Solution { map: at.map, free: at.free, energy: at.energy };
         Ok(())
@@ -212,15 +212,12 @@ impl Optimiser<'_> {
         }
     }
 
-    /// Relaxes feature edges with an end within `rings` rings of flipped triangles.
+    /// Relaxes feature edges with an end within `rings` rings of flipped triangles, at least one.
     fn relax_near_flips(&mut self, flipped: &[FaceId], rings: usize) {
         let mesh = &self.state.topology.mesh;
         let mut near = vec![false; mesh.n_vertices()];
-        let mut faces: Vec<FaceId> = flipped.to_vec();
-        for _ in 0..rings {
-            faces.iter().flat_map(|&f| mesh.face_vertices(f)).for_each(|v| near[v.index()] = true);
-            faces = mesh.faces().filter(|&f| mesh.face_vertices(f).iter().any(|v| near[v.index()])).collect();
-        }
+        flipped.iter().flat_map(|&f| mesh.face_vertices(f)).for_each(|v| near[v.index()] = true);
+        mesh.dilate_vertices(&mut near, rings - 1);
         self.relaxed.resize(mesh.n_edges(), false);
         for e in mesh.edges().filter(|e| self.sharp[e.index()]) {
             self.relaxed[e.index()] |= mesh.edge_vertices(e).iter().any(|v| near[v.index()]);

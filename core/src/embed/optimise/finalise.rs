@@ -6,7 +6,7 @@ use crate::embed::optimise::descent::MAX_FLIPPED;
 use crate::embed::optimise::optimiser::Optimiser;
 use crate::embed::parameterise::solve::Systems;
 use crate::embed::parameterise::state::State;
-use crate::embed::parameterise::stiffen::stiffen;
+use crate::embed::parameterise::stiffen::stiffening;
 use crate::param::{Effort, FlippedTriangle};
 use crate::progress::Progress;
 
@@ -53,12 +53,12 @@ impl Optimiser<'_> {
         let quarters = topology.quarters();
         let at = (&solution.free[..], &quarters[..]);
         let triangles = system.triangles(&topology.mesh, metric, field, objective)?;
-        let unfolded = system.unfold(&triangles, at, Effort::Thorough, progress)?;
-        tracing::debug!(before = unfolded.folds_before, after = unfolded.folds.len(), "flipped triangles removed");
-        solution.map = system.map(&unfolded.y);
-        solution.energy = unfolded.energy;
-        solution.free = unfolded.y;
-        Ok(unfolded.folds)
+        let repaired = system.remove_flips(&triangles, at, Effort::Thorough, progress)?;
+        tracing::debug!(before = repaired.flipped_before, after = repaired.flipped.len(), "flipped triangles removed");
+        solution.map = system.map(&repaired.y);
+        solution.energy = repaired.energy;
+        solution.free = repaired.y;
+        Ok(repaired.flipped)
     }
 
     /// As [`Self::finalise`] in the injective phase, where no triangle is flipped. Features come first: regular nodes
@@ -111,7 +111,7 @@ impl Optimiser<'_> {
             if least == 0 {
                 break;
             }
-            stiffen(&work.topology.mesh, &work.flipped_triangles(), STIFFENING_GROWTH, &mut weight);
+            stiffening(STIFFENING_GROWTH).raise_around(&work.topology.mesh, &work.flipped_triangles(), &mut weight);
             work.objective.stiffness = weight.clone();
             work.solution = system.solve(&work.metric, &work.field, &work.objective, progress)?;
             let now = work.flipped();

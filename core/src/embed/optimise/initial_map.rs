@@ -115,10 +115,10 @@ impl MappedEmbedding {
         let mut positions: Vec<DVec3> = initial_embedding.mesh.positions.clone();
         let (mut faces, mut base_face, mut uv) = (Vec::new(), Vec::new(), Vec::new());
         let mut seeds = Vec::with_capacity(maps.len());
-        for PatchMap { mesh, whole, base_face: base, uv: at, .. } in &maps {
-            let first_new = positions.len() - whole.len();
-            let global = |v: usize| whole.get(v).copied().unwrap_or((first_new + v) as u32);
-            positions.extend(&mesh.positions()[whole.len()..]);
+        for PatchMap { mesh, parent, base_face: base, uv: at, .. } in &maps {
+            let first_new = positions.len() - parent.len();
+            let global = |v: usize| parent.get(v).copied().unwrap_or((first_new + v) as u32);
+            positions.extend(&mesh.positions()[parent.len()..]);
             seeds.push(faces.len() as u32);
             for f in mesh.faces() {
                 let corners = mesh.face_vertices(f);

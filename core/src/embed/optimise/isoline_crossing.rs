@@ -4,14 +4,14 @@
 //! differences to its own coordinates are a step in the map; the gradients of the map turn it into a step on the
 //! surface. On a through-arc without constrained nodes all nodes take the mean of their coordinates.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 use glam::DVec2;
 
 use crate::embed::parameterise::chord_lengths::transition;
-use crate::embed::topology::embedding_topology::{EmbeddingTopology, jump_across};
-use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs, around};
-use crate::mesh::{FaceId, HalfedgeId};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
+use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs, fan_crossings};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId};
 use crate::param::SeamlessMap;
 use crate::surface::Metric;
 
@@ -19,7 +19,7 @@ use crate::surface::Metric;
 /// the map is too flat to be inverted. Chosen by hand.
 const FLAT: f64 = 0.05;
 /// Largest number of triangles between a node and its crossing or its feature. Chosen by hand.
-const MAX_RINGS: usize = 24;
+const MAX_RINGS: u32 = 24;
 
 /// The step from a regular node with the given half-arcs to the crossing of its isolines, as a vector in the plane of
 /// the triangle of the returned corner; `None` where the map does not determine it.
@@ -55,8 +55,8 @@ pub(super) fn crossing(
     let mut free = [(0.0, 1.0); 2];
     for &end in half_arcs {
         for (chain, node) in through_arcs.continuations(topology, end) {
-            let mut crossed = around(mesh, corner, chain.start)?;
-            let turns: i32 = crossed.iter().map(|&h| jump_across(mesh, &topology.jump, h)).sum();
+            let mut crossed = fan_crossings(mesh, corner, chain.start)?;
+            let turns = topology.turns_along(&crossed);
             let heading = (i32::from(chain.heading) + turns).rem_euclid(4);
             crossed.extend(&chain.crossed);
             let there = transition(mesh, map, &crossed)?.inverse().apply(at(map, chain.end));
@@ -88,17 +88,23 @@ pub(super) fn search_outward<T>(
     mut found: impl FnMut(FaceId, DVec2) -> Option<T>,
 ) -> Option<(T, Vec<FaceId>)> {
     let mesh = &topology.mesh;
-    let mut queue: VecDeque<(FaceId, DVec2, usize)> = first.into_iter().map(|(f, at)| (f, at, 0)).collect();
-    let mut before: HashMap<FaceId, Option<FaceId>> = queue.iter().map(|&(f, ..)| (f, None)).collect();
-    while let Some((f, at, rings)) = queue.pop_front() {
+    let mut search = BreadthFirst::sparse();
+    let mut point: HashMap<FaceId, DVec2> = HashMap::new();
+    for (f, at) in first {
+        search.start(f);
+        point.insert(f, at);
+    }
+    while let Some(f) = search.visit() {
+        let at = point[&f];
         if let Some(found) = found(f, at) {
-            return Some((found, std::iter::successors(Some(f), |f| before[f]).collect()));
+            return Some((found, std::iter::successors(Some(f), |&f| search.via(f)).collect()));
         }
-        for h in mesh.face_halfedges(f).into_iter().filter(|_| rings < MAX_RINGS) {
+        let within = search.depth(f).is_some_and(|rings| rings < MAX_RINGS);
+        for (h, g) in mesh.adjacent_faces(f).filter(|_| within) {
             let Some(change) = map.transition(mesh, h) else { continue };
-            let Some(g) = mesh.twin(h).map(|t| mesh.face(t)).filter(|g| !before.contains_key(g)) else { continue };
-            before.insert(g, Some(f));
-            queue.push_back((g, change.apply(at), rings + 1));
+            if search.reach(g, f) {
+                point.insert(g, change.apply(at));
+            }
         }
     }
     None

@@ -17,7 +17,6 @@ use crate::embed::problem::{Problem, Settings};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::embed::topology::through_arcs::{HalfArc, ThroughArcs};
 use crate::layout::QuadLayout;
-use crate::mesh::VertexId;
 use crate::param::{DistortionWeights, gradients};
 use crate::progress::Progress;
 use crate::surface::{Metric, PrincipalCurvature};
@@ -148,7 +147,7 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Begins the descent anew: usual step sizes, and as many steps as at first.
-    pub(in crate::embed) fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.step_factor.fill(1.0);
         (self.failed, self.idle, self.steps) = (0, 0, 0);
     }
@@ -269,16 +268,8 @@ impl<'a> Optimiser<'a> {
                 near[v.index()] = true;
             }
         }
-        let mut turning = vec![false; mesh.n_faces()];
-        for _ in 0..TURNING_RINGS {
-            for f in mesh.faces() {
-                turning[f.index()] |= mesh.face_vertices(f).iter().any(|v: &VertexId| near[v.index()]);
-            }
-            for f in mesh.faces().filter(|f| turning[f.index()]) {
-                mesh.face_vertices(f).iter().for_each(|v| near[v.index()] = true);
-            }
-        }
-        turning
+        mesh.dilate_vertices(&mut near, TURNING_RINGS - 1);
+        mesh.faces_at(&near)
     }
 }
 

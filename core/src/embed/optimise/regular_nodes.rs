@@ -15,7 +15,7 @@ use crate::embed::parameterise::chord_lengths::transition;
 use crate::embed::parameterise::solve::FeatureConstraint;
 use crate::embed::parameterise::state::State;
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::embed::topology::through_arcs::around;
+use crate::embed::topology::through_arcs::fan_crossings;
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::param::SeamlessMap;
 use crate::progress::Progress;
@@ -119,7 +119,7 @@ impl Optimiser<'_> {
         let (mesh, map, v) = (&topology.mesh, &solution.map, topology.mesh.origin(h));
         let read = || {
             let (from, at) = coordinates_near(topology, map, v, moved.mesh.position(v))?;
-            let crossed = around(mesh, from, h)?;
+            let crossed = fan_crossings(mesh, from, h)?;
             Some(transition(mesh, map, &crossed)?.apply(at))
         };
         let stays = mesh.position(v) == moved.mesh.position(v) || mesh.is_boundary_vertex(v);

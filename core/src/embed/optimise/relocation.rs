@@ -5,12 +5,12 @@
 //! inserted and no connectivity changes. Positions are projected onto the surface of the problem; a position is
 //! refused, and the step halved, where triangles around it would flip or degenerate.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::{Metric, SurfaceIndex, trace_geodesic};
 
 /// Halvings of a step that is not possible before the node stays. Chosen by hand.
@@ -279,15 +279,13 @@ fn strip(mesh: &TriMesh, first: FaceId, crossed: &[HalfedgeId]) -> Vec<FaceId> {
 }
 
 /// A shortest path of edges within a strip of triangles that avoids the boundary and vertices that are `taken`.
-pub(in crate::embed) fn edge_path(
+pub(super) fn edge_path(
     mesh: &TriMesh,
     strip: &[FaceId],
     from: VertexId,
     to: VertexId,
     taken: impl Fn(VertexId) -> bool,
 ) -> Option<Vec<HalfedgeId>> {
-    let mut reached: HashMap<VertexId, HalfedgeId> = HashMap::new();
-    let mut queue = VecDeque::from([from]);
     let mut spokes: HashMap<VertexId, Vec<HalfedgeId>> = HashMap::new();
     for &f in strip {
         for h in mesh.face_halfedges(f) {
@@ -297,28 +295,17 @@ pub(in crate::embed) fn edge_path(
             }
         }
     }
-    while let Some(v) = queue.pop_front() {
-        if v == to {
-            break;
-        }
+    let mut search = BreadthFirst::sparse();
+    search.start(from);
+    while let Some(v) = search.visit().filter(|&v| v != to) {
         for &h in spokes.get(&v).into_iter().flatten() {
             let w = mesh.target(h);
-            let free = !taken(w) && !mesh.is_boundary_vertex(w);
-            if w != from && free && !reached.contains_key(&w) {
-                reached.insert(w, h);
-                queue.push_back(w);
+            if !taken(w) && !mesh.is_boundary_vertex(w) {
+                search.reach(w, h);
             }
         }
     }
-    let mut path = Vec::new();
-    let mut at = to;
-    while at != from {
-        let &h = reached.get(&at)?;
-        path.push(h);
-        at = mesh.origin(h);
-    }
-    path.reverse();
-    Some(path)
+    search.path_to(to, |&h| mesh.origin(h))
 }
 
 /// A triangle with its corners at their rest positions.

@@ -8,7 +8,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-use crate::embed::topology::embedding_topology::{EmbeddingTopology, jump_across};
+use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{HalfedgeId, VertexId};
 use crate::surface::Metric;
 
@@ -131,7 +131,7 @@ fn line_directions(
         // An edge is named by one of its two half-edges, whose triangle need not be the one to the left of the line.
         let own = (k - turned[i]).rem_euclid(4);
         let first = mesh.halfedge(mesh.edge(h));
-        let heading = if first == h { own } else { (own - jump_across(mesh, &topology.jump, h) + 2).rem_euclid(4) };
+        let heading = if first == h { own } else { (own - topology.jump_across(h) + 2).rem_euclid(4) };
         DirectedEdge { halfedge: first, heading, off: off(i, k).abs() }
     };
     line.iter().enumerate().map(each).collect()
@@ -147,7 +147,7 @@ fn turns_between(topology: &EmbeddingTopology, a: HalfedgeId, b: HalfedgeId) -> 
     while mesh.prev(at) != a {
         let across = mesh.prev(at);
         at = mesh.twin(across)?;
-        turns += jump_across(mesh, &topology.jump, at);
+        turns += topology.jump_across(at);
         if at == b {
             return None;
         }
@@ -183,13 +183,13 @@ pub(super) fn heading_in(topology: &EmbeddingTopology, side: HalfedgeId, of: &Di
     if of.halfedge == side {
         return of.heading;
     }
-    (of.heading - jump_across(&topology.mesh, &topology.jump, of.halfedge) + 2).rem_euclid(4)
+    (of.heading - topology.jump_across(of.halfedge) + 2).rem_euclid(4)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embed::topology::testing::net;
+    use crate::embed::topology::testing::sample_topology;
 
     #[test]
     fn a_change_of_direction_takes_more_than_a_few_edges_across_the_field() {
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn lines_partition_the_feature_edges_and_have_no_ends_inside() {
-        let topology = net();
+        let topology = sample_topology();
         let sharp: Vec<bool> = topology.mesh.edges().map(|e| e.0 % 5 == 0).collect();
         let lines = Lines::new(&topology, &sharp);
         let mut seen = vec![0; topology.mesh.n_edges()];
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn directions_agree_with_the_field_from_both_sides_of_an_edge() {
-        let topology = net();
+        let topology = sample_topology();
         let metric = Metric::new(&topology.mesh);
         let sharp = vec![true; topology.mesh.n_edges()];
         for headed in feature_directions(&topology, &metric, &topology.angle, &sharp) {
@@ -238,7 +238,7 @@ mod tests {
             if let Some(t) = topology.mesh.twin(h) {
                 // Against the edge its heading is the opposite one, in the frame of the other triangle.
                 let back = heading_in(&topology, t, &headed);
-                assert_eq!((back + jump_across(&topology.mesh, &topology.jump, h) + 2).rem_euclid(4), headed.heading);
+                assert_eq!((back + topology.jump_across(h) + 2).rem_euclid(4), headed.heading);
             }
         }
     }

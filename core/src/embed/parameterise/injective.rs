@@ -8,12 +8,13 @@
 use glam::DVec2;
 
 use crate::embed::error::EmbeddingError;
-use crate::embed::parameterise::stiffen::stiffen;
+use crate::embed::parameterise::stiffen::stiffening;
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::field::CrossField;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::param::{
-    DistortionWeights, Effort, InjectiveEnergy, InjectiveMap, Objective, SeamlessSystem, Solution, folds, gradients,
+    DistortionWeights, Effort, InjectiveEnergy, InjectiveMap, Objective, SeamlessSystem, Solution, flipped_triangles,
+    gradients,
 };
 use crate::progress::Progress;
 use crate::surface::Metric;
@@ -77,17 +78,17 @@ impl MapInputs<'_> {
         let Self { topology, metric, field, objective, distortion, anisotropy_share, penalised } = *self;
         let energy = InjectiveEnergy::new(metric, &field.angle, objective, (distortion, anisotropy_share))
             .with_isoline_penalties(penalised);
-        let newton = system.newton()?;
+        let newton = system.newton_system()?;
         let few = match initial {
             InitialMap::Injective(_) | InitialMap::UpToQuarterTurns(_) => FEW_AT_FIRST,
             InitialMap::BeforeStep { .. } => FEW_AFTER_STEP,
             InitialMap::InPlace(_) => 0,
         };
         let (free, mut flipped) = self.fit(system, &self.target_gradients(initial), few, progress)?;
-        let mut found = system.injective(&energy, free.clone());
+        let mut found = system.injective_map(&energy, free.clone());
         if let (None, InitialMap::InPlace(uv)) = (&found, initial) {
             let by = (&*newton, &energy);
-            match system.approach((&topology.mesh, metric), by, (&field.angle, uv), progress)? {
+            match system.enforce_constraints((&topology.mesh, metric), by, (&field.angle, uv), progress)? {
                 Ok(reached) => found = Some(reached),
                 // The initial map is not one of this system: the flips of the guess are all that is known.
                 Err(ahead) if ahead.is_empty() => {}
@@ -96,14 +97,14 @@ impl MapInputs<'_> {
         } else if found.is_none() && flipped.len() <= few {
             let quarters = topology.quarters();
             let triangles = system.triangles(&topology.mesh, metric, field, objective)?;
-            let unfolded = system.unfold(&triangles, (&free, &quarters), Effort::Quick, progress)?;
-            tracing::debug!(flipped = flipped.len(), left = unfolded.folds.len(), "flipped triangles of the guess");
-            found = system.injective(&energy, unfolded.y.clone());
+            let repaired = system.remove_flips(&triangles, (&free, &quarters), Effort::Quick, progress)?;
+            tracing::debug!(flipped = flipped.len(), left = repaired.flipped.len(), "flipped triangles of the guess");
+            found = system.injective_map(&energy, repaired.y.clone());
             // Untangling is expensive. After a node step a shorter step is the better way out; a first map has no
             // other.
             if found.is_none() && matches!(initial, InitialMap::Injective(_) | InitialMap::UpToQuarterTurns(_)) {
                 let whole = (&topology.mesh, &quarters[..]);
-                found = system.untangle(&newton, &energy, unfolded.y, whole, progress)?;
+                found = system.untangle(&newton, &energy, repaired.y, whole, progress)?;
             }
         }
         let Some(mut at) = found else {
@@ -141,7 +142,7 @@ impl MapInputs<'_> {
     ) -> Result<(Vec<f64>, Vec<FaceId>), EmbeddingError> {
         let Self { topology, metric, field, .. } = *self;
         let mut free = system.fit(metric, &field.angle, wanted, &[])?;
-        let mut flipped = folds(&system.map(&free).uv);
+        let mut flipped = flipped_triangles(&system.map(&free).uv);
         let mut weight = vec![1.0; wanted.len()];
         for _ in 0..REFITS {
             progress.check()?;
@@ -150,9 +151,9 @@ impl MapInputs<'_> {
             }
             let mut list = vec![false; wanted.len()];
             flipped.iter().for_each(|f| list[f.index()] = true);
-            stiffen(&topology.mesh, &list, REFIT_GROWTH, &mut weight);
+            stiffening(REFIT_GROWTH).raise_around(&topology.mesh, &list, &mut weight);
             let again = system.fit(metric, &field.angle, wanted, &weight)?;
-            let left = folds(&system.map(&again).uv);
+            let left = flipped_triangles(&system.map(&again).uv);
             tracing::debug!(flipped = flipped.len(), left = left.len(), "fitted again");
             if left.len() >= flipped.len() {
                 break;

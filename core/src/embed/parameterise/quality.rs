@@ -281,7 +281,7 @@ mod tests {
     fn measures_of_patches_agree_with_those_of_the_surface() {
         let mesh = square(4);
         let patch = PatchMap {
-            whole: (0..25).collect(),
+            parent: (0..25).collect(),
             base_face: (0..32).collect(),
             uv: mesh.positions().iter().map(|p| p.truncate() * DVec2::new(3.0, 1.0)).collect(),
             size: DVec2::new(3.0, 1.0),

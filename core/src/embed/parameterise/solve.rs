@@ -190,9 +190,11 @@ impl Solver<'_> {
             };
             match (built, system) {
                 (Ok(()), Some(done)) => return Ok(done),
-                (Err(ParamError::Conflict { relation, .. }), kept) if !(lengths.is_empty() && features.is_empty()) => {
-                    tracing::debug!(relation, layout = layout.len(), "a constraint contradicts the layout");
-                    match relation.checked_sub(layout.len() + lengths.len()) {
+                (Err(ParamError::Conflict { constraint, .. }), kept)
+                    if !(lengths.is_empty() && features.is_empty()) =>
+                {
+                    tracing::debug!(constraint, layout = layout.len(), "a constraint contradicts the layout");
+                    match constraint.checked_sub(layout.len() + lengths.len()) {
                         Some(feature) => drop(features.remove(feature)),
                         // The error names the constraint eliminated last, which need not be the one to blame. The
                         // features that deviate most from the field are the likeliest.

@@ -7,7 +7,7 @@
 
 use crate::embed::pipeline::report::{CollapsedChord, UncollapsedChord};
 use crate::embed::problem::Problem;
-use crate::layout::{CollapseError, CollapsedLayout, QuadLayout, Reembedded, ReembeddingError, redraw};
+use crate::layout::{CollapseError, CollapsedLayout, QuadLayout, Reembedded, ReembeddingError, reembed};
 use crate::progress::Progress;
 
 /// The chords of a layout that are collapsed, and those that cannot be.
@@ -92,7 +92,7 @@ impl<'a> ChordCollapse<'a> {
 
     /// The layout without the collapsed chords, or why these cannot be deleted.
     fn remaining_layout(&self) -> Result<CollapsedLayout, String> {
-        let remaining = self.layout.without(&self.deleted).map_err(|e: CollapseError| e.to_string())?;
+        let remaining = self.layout.without_chords(&self.deleted).map_err(|e: CollapseError| e.to_string())?;
         let mut taken: Vec<Option<usize>> = vec![None; remaining.layout.nodes.len()];
         for n in (0..self.fixed_nodes.len()).filter(|&n| self.fixed_nodes[n]) {
             if let Some(other) = taken[remaining.nodes[n] as usize].replace(n) {
@@ -106,7 +106,7 @@ impl<'a> ChordCollapse<'a> {
     pub(super) fn reembed(&self, problem: &Problem<'_>, progress: &Progress) -> Result<Reembedded, ReembeddingError> {
         let Problem { surface, layout, initial_embedding, .. } = *problem;
         let fixed = |n: usize| self.fixed_nodes[n];
-        redraw(layout, initial_embedding, &self.deleted, fixed, surface.mesh.n_vertices(), progress)
+        reembed(layout, initial_embedding, &self.deleted, fixed, surface.mesh.n_vertices(), progress)
     }
 
     /// Number of patches that a chord runs through.

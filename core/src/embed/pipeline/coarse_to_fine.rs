@@ -4,8 +4,6 @@
 //! proportional to the number of triangles. So the layout is transferred to a proxy, optimised there, and transferred
 //! back. On the mesh itself remain a first map, constraining features and nodes, and a few node steps.
 
-use std::collections::VecDeque;
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -18,8 +16,8 @@ use crate::embed::pipeline::phases::{Observer, Phases};
 use crate::embed::pipeline::report::{Next, OptimisedEmbedding, Snapshot};
 use crate::embed::problem::{Problem, Settings, Surface};
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
-use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, carry};
-use crate::mesh::{FaceId, TriMesh};
+use crate::layout::{DualCurve, Embedding, PatchMap, QuadLayout, transfer_embedding};
+use crate::mesh::{BreadthFirst, FaceId, TriMesh};
 use crate::progress::Progress;
 use crate::proxy::Proxy;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, SurfacePoint, nearest_in_triangle};
@@ -160,16 +158,16 @@ struct ProxyTransfer<'a> {
 impl ProxyTransfer<'_> {
     /// The initial embedding of the problem on the proxy; `None` if there is none.
     fn to_proxy(&self, problem: &Problem<'_>, progress: &Progress) -> Result<Option<Embedding>, EmbeddingError> {
-        let drawn = (problem.layout, problem.initial_embedding, self.fine.n_vertices());
+        let given = (problem.layout, problem.initial_embedding, self.fine.n_vertices());
         let place = |n: usize| {
             let at = surface_point(self.fine, problem.initial_embedding, problem.initial_embedding.nodes[n]);
             Some(self.proxy.to_proxy(self.fine, at).nearest_vertex(self.proxy.mesh()))
         };
-        let carried = |line: &DualCurve| {
+        let transferred = |line: &DualCurve| {
             let found = self.proxy.polyline_to_proxy(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the proxy")).ok()
         };
-        Ok(carry(drawn, self.proxy.mesh(), carried, place, progress)?)
+        Ok(transfer_embedding(given, self.proxy.mesh(), transferred, place, progress)?)
     }
 
     /// An embedding on the proxy as an initial embedding on the mesh; `None` if there is none.
@@ -183,11 +181,17 @@ impl ProxyTransfer<'_> {
             let at = surface_point(self.proxy.mesh(), embedding, embedding.nodes[n]);
             Some(self.proxy.to_original(self.fine, at).nearest_vertex(self.fine))
         };
-        let carried = |line: &DualCurve| {
+        let transferred = |line: &DualCurve| {
             let found = self.proxy.polyline_to_original(self.fine, &line.points, line.closed);
             found.inspect_err(|error| tracing::debug!(%error, "a curve cannot be transferred to the mesh")).ok()
         };
-        Ok(carry((layout, embedding, self.proxy.mesh().n_vertices()), self.fine, carried, place, progress)?)
+        Ok(transfer_embedding(
+            (layout, embedding, self.proxy.mesh().n_vertices()),
+            self.fine,
+            transferred,
+            place,
+            progress,
+        )?)
     }
 
     /// The map of the proxy on the triangles of a topology of the mesh, up to translations and quarter turns: each
@@ -212,12 +216,14 @@ impl ProxyTransfer<'_> {
         };
         let mut maps: Vec<Option<Affine>> = mesh.faces().collect::<Vec<_>>().into_par_iter().map(found).collect();
         // Triangles of the proxy all of whose pieces are degenerate have no map: take that of a neighbour.
-        let mut queue: VecDeque<FaceId> = mesh.faces().filter(|f| maps[f.index()].is_some()).collect();
-        while let Some(f) = queue.pop_front() {
-            for g in mesh.face_halfedges(f).into_iter().filter_map(|h| mesh.twin(h)).map(|h| mesh.face(h)) {
-                if maps[g.index()].is_none() {
+        let mut search = BreadthFirst::new(mesh.n_faces());
+        for f in mesh.faces().filter(|f| maps[f.index()].is_some()) {
+            search.start(f);
+        }
+        while let Some(f) = search.visit() {
+            for (_, g) in mesh.adjacent_faces(f) {
+                if search.reach(g, ()) {
                     maps[g.index()] = maps[f.index()];
-                    queue.push_back(g);
                 }
             }
         }

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
     use crate::dual::Arrangement;
     use crate::embed::{Settings, Surface, arc_headings};
-    use crate::layout::{QuadLayout, embed};
+    use crate::layout::{QuadLayout, initial_embedding};
     use crate::surface::{SurfaceCurve, SurfaceIndex, principal_curvature};
     use crate::testing::{column, diagonal, row, torus};
 
@@ -84,7 +84,7 @@ mod tests {
         let arrangement = Arrangement::new(&mesh, curves).unwrap();
         let layout = QuadLayout::dual(&arrangement, &[], 0).unwrap();
         let initial_embedding =
-            embed(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
+            initial_embedding(&arrangement, &layout, &vec![None; layout.nodes.len()], &Progress::new()).unwrap();
         let sharp = vec![false; mesh.n_edges()];
         let curvature = principal_curvature(&mesh, 0.03, &sharp);
         let index = SurfaceIndex::new(&mesh);

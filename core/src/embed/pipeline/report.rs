@@ -6,7 +6,8 @@ use serde::Serialize;
 use crate::embed::parameterise::quality::Measures;
 use crate::embed::parameterise::state::{FeatureEdges, State};
 use crate::embed::topology::embedding_topology::TopologyArc;
-use crate::embed::trace::arcs::{ArcChain, preview_arcs};
+use crate::embed::trace::arcs::preview_arcs;
+use crate::embed::trace::separatrix_matching::ArcChain;
 use crate::layout::{Embedding, PatchMap, QuadLayout};
 
 /// The embedding while it is being optimised.

@@ -97,3 +97,39 @@ fn paths_to(mesh: &TriMesh, corner: VertexId, open: impl Fn(VertexId) -> bool) -
     }
     search
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::samples::cells;
+
+    #[test]
+    fn the_corners_of_a_cube_fit_nodes_of_valence_three() {
+        let mesh = cells(&[[0, 0, 0]], 3);
+        let normal = |h: HalfedgeId| mesh.face_normal(mesh.face(h));
+        let sharp: Vec<bool> = mesh
+            .edges()
+            .map(|e| {
+                let h = mesh.halfedge(e);
+                normal(h).dot(normal(mesh.twin(h).unwrap())) < 0.5
+            })
+            .collect();
+        let found = corners(&mesh, &sharp);
+        assert_eq!(found.len(), 8, "vertices along straight edges are no corners");
+        assert!(found.iter().all(|&(_, valence)| valence == 3));
+    }
+
+    #[test]
+    fn paths_to_a_corner_stay_on_open_vertices() {
+        let mesh = cells(&[[0, 0, 0]], 2);
+        let corner = VertexId(0);
+        let ring: Vec<VertexId> = mesh.outgoing(corner).map(|h| mesh.target(h)).collect();
+        let search = paths_to(&mesh, corner, |v| v != ring[0]);
+        assert_eq!(search.distance(corner), 0.0);
+        assert!(search.distance(ring[0]).is_infinite());
+        let along = search.via(ring[1]).unwrap();
+        assert_eq!((mesh.origin(along), mesh.target(along)), (ring[1], corner));
+        let enclosed = paths_to(&mesh, corner, |v| !ring.contains(&v));
+        assert_eq!(enclosed.reached(), [corner]);
+    }
+}

@@ -14,9 +14,7 @@ use std::collections::HashMap;
 use crate::dual::{Mark, next};
 use crate::embed::EmbeddingError;
 use crate::embed::topology::node_insertion::WorkingMesh;
-use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps, turns_along};
-// Shared with the rooms that walk over triangles of a topology.
-pub(in crate::embed) use crate::embed::topology::period_jumps::jump_across;
+use crate::embed::topology::period_jumps::{DirectionHint, integer_jumps, jump_across, turns_along};
 use crate::layout::{Embedding, QuadLayout};
 use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::surface::Metric;
@@ -305,5 +303,61 @@ impl Charts {
                 Some(DirectionHint { face: FaceId(refined.tag[h as usize / 3]), vector, direction: k })
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::topology::testing::{indices, regular_topology, sample_topology};
+    use crate::layout::{Arc, Node, Patch};
+
+    #[test]
+    fn the_index_of_a_node_counts_missing_quarters() {
+        let node = |valence, boundary| TopologyNode { vertex: VertexId(0), valence, boundary };
+        assert_eq!([node(3, false), node(4, false), node(6, false)].map(|n| n.index()), [1, 0, -2]);
+        assert_eq!([node(1, true), node(2, true), node(3, true)].map(|n| n.index()), [1, 0, -1]);
+        assert!(node(2, true).is_regular() && !node(2, false).is_regular());
+    }
+
+    #[test]
+    fn arcs_on_the_boundary_have_one_heading() {
+        let nodes = vec![Node { valence: 1, boundary: true }; 4];
+        let arc = |a, b| Arc { nodes: [a, b], boundary: true, chord: 0 };
+        let arcs = vec![arc(0, 1), arc(1, 2), arc(3, 2), arc(3, 0)];
+        let patches = vec![Patch { corners: [0, 1, 2, 3], sides: [(0, true), (1, true), (2, false), (3, true)] }];
+        let layout = QuadLayout { nodes, arcs, patches, chords: 2 };
+        let expected = [[Some(0), None], [Some(1), None], [None, Some(2)], [Some(3), None]];
+        assert_eq!(arc_headings(&layout), expected);
+    }
+
+    #[test]
+    fn jumps_back_are_inverse() {
+        let topology = sample_topology();
+        let (mesh, jump) = (&topology.mesh, &topology.jump);
+        for h in mesh.halfedges() {
+            let twin = mesh.twin(h).unwrap();
+            assert_eq!(jump_across(mesh, jump, h), -jump_across(mesh, jump, twin));
+            assert_eq!(topology.turns_along(&[h, twin, h]), topology.jump_across(h));
+        }
+    }
+
+    #[test]
+    fn a_regular_layout_has_a_field_without_singularities() {
+        let (layout, topology) = regular_topology();
+        assert!(topology.nodes.iter().all(TopologyNode::is_regular));
+        assert_eq!(topology.nodes.len(), layout.nodes.len());
+        assert!(indices(&topology.mesh, &topology.jump).iter().all(|&i| i == 0));
+        assert!(topology.quarters().iter().all(|&q| q == 4));
+    }
+
+    #[test]
+    fn the_angle_in_a_map_is_the_valence_of_the_node() {
+        let topology = sample_topology();
+        let quarters = topology.quarters();
+        for n in &topology.nodes {
+            assert_eq!(quarters[n.vertex.index()], n.valence as u32);
+        }
+        assert_eq!(quarters.iter().filter(|&&q| q != 4).count(), 2);
     }
 }

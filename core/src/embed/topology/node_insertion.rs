@@ -291,3 +291,41 @@ impl Plane {
         DVec2::new((p - self.origin).dot(self.x), (p - self.origin).dot(self.y))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::topology::testing::torus_layout;
+    use crate::testing::torus;
+
+    #[test]
+    fn triangles_with_inserted_nodes_are_covered_by_their_parts() {
+        let mesh = torus(12, 8);
+        let (_, mut embedding) = torus_layout(&mesh, [12, 8], [1, 5], [2, 8]);
+        // A vertex of an arc inside the surface becomes a node where the surface has no vertex.
+        let n_surface = mesh.n_vertices();
+        let inside = embedding.arcs.iter().flatten().find(|&&v| v as usize >= n_surface).copied();
+        embedding.nodes.extend(inside);
+        let working = WorkingMesh::new(&mesh, &embedding).unwrap();
+        assert_eq!(working.mesh.n_vertices(), n_surface + usize::from(inside.is_some()));
+        assert_eq!(working.mesh.euler_characteristic(), mesh.euler_characteristic());
+        for (&v, &x) in working.nodes.iter().zip(&embedding.nodes) {
+            assert_eq!(working.mesh.position(v), working.refined.positions[x as usize]);
+        }
+        // The new edges need not be straight in the refined mesh, so that only the triangles of the surface keep their area.
+        let (mut area, mut parts) = (vec![0.0; mesh.n_faces()], vec![0.0; mesh.n_faces()]);
+        for f in 0..working.refined.n_faces() as u32 {
+            let corner = |h: u32| working.refined.positions[working.refined.origin(h) as usize];
+            let [a, b, c] = [3 * f, 3 * f + 1, 3 * f + 2].map(corner);
+            let working_face = working.refined.tag[f as usize] as usize;
+            area[working.base_face[working_face].index()] += 0.5 * (b - a).cross(c - a).length();
+        }
+        for f in working.mesh.faces() {
+            parts[working.base_face[f.index()].index()] += working.mesh.face_area(f);
+        }
+        for f in mesh.faces() {
+            assert!((area[f.index()] - mesh.face_area(f)).abs() < 1e-12, "refined faces in {f:?}");
+            assert!((parts[f.index()] - mesh.face_area(f)).abs() < 1e-12, "working triangles in {f:?}");
+        }
+    }
+}

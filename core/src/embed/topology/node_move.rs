@@ -139,7 +139,7 @@ mod tests {
     use proptest::prelude::*;
 
     use crate::embed::topology::embedding_topology::{EmbeddingTopology, TopologyArc, node_indices};
-    use crate::embed::topology::testing::{indices, is_chain, net, torus_topology};
+    use crate::embed::topology::testing::{indices, is_chain, sample_topology, torus_topology};
     use crate::mesh::HalfedgeId;
 
     /// Moves a node along one of the half-edges that leave it, unless another node is at the other end.
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn moving_a_node_moves_its_index_and_keeps_arcs_chains() {
-        let mut topology = net();
+        let mut topology = sample_topology();
         for step in 0..40usize {
             try_move(&mut topology, 0, step * 7 + step / 3);
             assert_eq!(indices(&topology.mesh, &topology.jump), node_indices(&topology.mesh, &topology.nodes));
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn moving_a_node_back_restores_jumps_and_headings() {
-        let mut topology = net();
+        let mut topology = sample_topology();
         let before = topology.clone();
         let h = topology.mesh.outgoing(topology.nodes[0].vertex).nth(2).unwrap();
         topology.move_node(0, h);

@@ -69,13 +69,13 @@ pub(super) fn integer_jumps(
 
 /// The period jump across `h`, from its triangle to that of its twin.
 #[inline]
-pub(in crate::embed) fn jump_across(mesh: &TriMesh, jump: &[i32], h: HalfedgeId) -> i32 {
+pub(super) fn jump_across(mesh: &TriMesh, jump: &[i32], h: HalfedgeId) -> i32 {
     let e = mesh.edge(h);
     if mesh.halfedge(e) == h { jump[e.index()] } else { -jump[e.index()] }
 }
 
 /// The sum of the jumps across a chain of half-edges: the rotation from the first triangle's frame to the last one's.
-pub(in crate::embed) fn turns_along(mesh: &TriMesh, jump: &[i32], crossed: &[HalfedgeId]) -> i32 {
+pub(super) fn turns_along(mesh: &TriMesh, jump: &[i32], crossed: &[HalfedgeId]) -> i32 {
     crossed.iter().map(|&h| jump_across(mesh, jump, h)).sum()
 }
 
@@ -223,5 +223,17 @@ mod tests {
         move_index(&mesh, &mut jump, HalfedgeId(5), 1);
         let error = correct_indices(&mesh, &metric, &mut jump, &index).unwrap_err();
         assert!(matches!(error, EmbeddingError::Turning { .. }));
+    }
+
+    #[test]
+    fn the_path_with_the_fewest_edges_is_found_or_none() {
+        let mesh = torus(12, 8);
+        // Vertex `i + 12 j` of the grid; diagonals go from (i, j) to (i + 1, j + 1).
+        let path = fewest_edges(&mesh, VertexId(0), |v| v == VertexId(3 + 12 * 3)).unwrap();
+        assert_eq!(path.len(), 3);
+        assert_eq!((mesh.origin(path[0]), mesh.target(path[2])), (VertexId(0), VertexId(39)));
+        assert!(path.windows(2).all(|w| mesh.target(w[0]) == mesh.origin(w[1])));
+        assert!(fewest_edges(&mesh, VertexId(0), |_| false).is_none());
+        assert_eq!(fewest_edges(&mesh, VertexId(0), |_| true).unwrap().len(), 1, "the start is not a target");
     }
 }

@@ -282,11 +282,11 @@ fn parts(corners: [u32; 3], sides: [HalfedgeId; 3], middle: [Option<u32>; 3], po
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embed::topology::testing::{indices, is_chain, net};
+    use crate::embed::topology::testing::{indices, is_chain, sample_topology};
 
     #[test]
     fn refinement_keeps_surface_arcs_and_indices() {
-        let topology = net();
+        let topology = sample_topology();
         let sharp: Vec<bool> = topology.mesh.edges().map(|e| e.0 % 3 == 0).collect();
         let mark: Vec<u32> = (0..topology.mesh.n_vertices() as u32).collect();
         let (fine, attributes) = topology.refine_at_irregular_nodes(&topology.angle, &sharp, &mark).unwrap().unwrap();
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn link_edges_are_split_until_an_irregular_node_has_enough_triangles() {
-        let mut topology = net();
+        let mut topology = sample_topology();
         // More than six triangles can have without one that is flipped.
         topology.nodes[1].valence = 12;
         let mark = vec![(); topology.mesh.n_vertices()];
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn without_irregular_nodes_there_is_no_refinement() {
-        let mut topology = net();
+        let mut topology = sample_topology();
         topology.nodes.iter_mut().for_each(|n| n.valence = 4);
         let (sharp, mark) = (vec![false; topology.mesh.n_edges()], vec![(); topology.mesh.n_vertices()]);
         assert!(topology.refine_at_irregular_nodes(&topology.angle, &sharp, &mark).unwrap().is_none());

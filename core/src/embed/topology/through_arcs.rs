@@ -89,7 +89,7 @@ impl ThroughArcs {
             if closed || (self.constrained[node(head)] && self.constrained[node(far)]) {
                 chains.extend(join(topology, &list).and_then(|mut c| {
                     if closed {
-                        c.crossed.extend(around(&topology.mesh, c.end, c.start)?);
+                        c.crossed.extend(fan_crossings(&topology.mesh, c.end, c.start)?);
                         c.end = c.start;
                     }
                     Some(c)
@@ -152,7 +152,7 @@ impl ThroughArcs {
         let mut crossed: Vec<HalfedgeId> = Vec::new();
         if let Some(before) = before {
             crossed.extend(before.crossed);
-            crossed.extend(around(&topology.mesh, before.end, arc.start)?);
+            crossed.extend(fan_crossings(&topology.mesh, before.end, arc.start)?);
         }
         let turns = topology.turns_along(&crossed);
         Some(TriangleChain { heading: (i32::from(arc.heading) + turns).rem_euclid(4) as u8, ..whole })
@@ -219,7 +219,7 @@ fn join(topology: &EmbeddingTopology, list: &[HalfArc]) -> Option<TriangleChain>
 /// A chain continued by a half-arc that starts at its end.
 fn extend(topology: &EmbeddingTopology, mut chain: TriangleChain, at: HalfArc) -> Option<TriangleChain> {
     let part = half_arc_chain(topology, at);
-    chain.crossed.extend(around(&topology.mesh, chain.end, part.start)?);
+    chain.crossed.extend(fan_crossings(&topology.mesh, chain.end, part.start)?);
     chain.crossed.extend(part.crossed);
     chain.end = part.end;
     Some(chain)
@@ -227,7 +227,7 @@ fn extend(topology: &EmbeddingTopology, mut chain: TriangleChain, at: HalfArc) -
 
 /// The half-edges crossed counter-clockwise around a vertex from the triangle of one corner to that of another; `None`
 /// at the boundary. At a regular vertex the other way around is homotopic.
-pub(in crate::embed) fn around(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<HalfedgeId>> {
+pub(in crate::embed) fn fan_crossings(mesh: &TriMesh, from: HalfedgeId, to: HalfedgeId) -> Option<Vec<HalfedgeId>> {
     let mut crossed = Vec::new();
     let mut at = from;
     while mesh.face(at) != mesh.face(to) {
@@ -246,4 +246,115 @@ pub(in crate::embed) fn corner_point(h: HalfedgeId) -> SurfacePoint {
     let mut weights = [0.0; 3];
     weights[h.index() % 3] = 1.0;
     SurfacePoint { face: FaceId::new(h.index() / 3), weights }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::topology::testing::{is_chain, regular_topology};
+    use crate::mesh::VertexId;
+
+    /// The half-edges of a chain follow one another.
+    fn is_connected(mesh: &TriMesh, chain: &TriangleChain) -> bool {
+        let mut face = mesh.face(chain.start);
+        chain.crossed.iter().all(|&h| std::mem::replace(&mut face, mesh.face(mesh.twin(h).unwrap())) == mesh.face(h))
+            && face == mesh.face(chain.end)
+    }
+
+    #[test]
+    fn chains_through_regular_nodes_only_are_closed() {
+        let (layout, topology) = regular_topology();
+        let chains = ThroughArcs::new(&layout, |_| false).chains(&topology);
+        // Two along the rows and two along the columns.
+        assert_eq!(chains.len(), 4);
+        for chain in &chains {
+            assert_eq!(chain.start, chain.end);
+            assert!(is_connected(&topology.mesh, chain));
+            assert_eq!(topology.turns_along(&chain.crossed).rem_euclid(4), 0, "a closed isoline keeps its direction");
+        }
+    }
+
+    #[test]
+    fn chains_between_pinned_nodes_are_the_arcs() {
+        let (layout, topology) = regular_topology();
+        let mut through = ThroughArcs::new(&layout, |_| true);
+        let chains = through.chains(&topology);
+        assert_eq!(chains.len(), topology.arcs.len());
+        for (a, arc) in topology.arcs.iter().enumerate() {
+            assert!(is_chain(&topology, a));
+            let is_arc = |c: &TriangleChain| c.crossed == arc.crossed && c.heading == arc.heading;
+            assert!(chains.iter().any(is_arc), "arc {a}");
+            assert!(is_arc(&through.length_chain(&topology, a as u32).unwrap()));
+        }
+        through.constrain_all();
+        assert_eq!(through.chains(&topology), chains);
+    }
+
+    #[test]
+    fn a_pinned_node_opens_the_chains_through_it() {
+        let (layout, topology) = regular_topology();
+        let through = ThroughArcs::new(&layout, |n| n == 0);
+        let at_node = |h: HalfedgeId| topology.mesh.origin(h) == topology.nodes[0].vertex;
+        let chains = through.chains(&topology);
+        assert_eq!(chains.len(), 4);
+        // One row and one column pass through the node, and begin and end there.
+        assert_eq!(chains.iter().filter(|c| at_node(c.start) && at_node(c.end)).count(), 2);
+    }
+
+    #[test]
+    fn an_arc_has_no_length_without_constrained_nodes() {
+        let (layout, topology) = regular_topology();
+        let through = ThroughArcs::new(&layout, |_| false);
+        assert!((0..topology.arcs.len() as u32).all(|a| through.length_chain(&topology, a).is_none()));
+    }
+
+    #[test]
+    fn continuations_end_at_the_first_constrained_node() {
+        let (layout, topology) = regular_topology();
+        for (pinned, nodes) in [(true, 1), (false, 2)] {
+            let through = ThroughArcs::new(&layout, |_| pinned);
+            for half_arc in (0..topology.arcs.len() as u32).flat_map(|a| [(a, false), (a, true)]) {
+                let found = through.continuations(&topology, half_arc);
+                assert_eq!(found.len(), nodes);
+                for (chain, node) in &found {
+                    assert_eq!(chain.start, through.corner(&topology, half_arc));
+                    assert_eq!(topology.mesh.origin(chain.end), topology.nodes[*node].vertex);
+                    assert!(is_connected(&topology.mesh, chain));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_half_arc_backward_has_the_opposite_heading() {
+        let (_, topology) = regular_topology();
+        for a in 0..topology.arcs.len() as u32 {
+            let [there, back] = [false, true].map(|second| half_arc_chain(&topology, (a, second)));
+            let at_end = i32::from(there.heading) - topology.turns_along(&there.crossed);
+            assert_eq!((i32::from(back.heading) - at_end).rem_euclid(4), 2);
+        }
+    }
+
+    #[test]
+    fn fan_crossings_go_once_around_a_vertex_at_most() {
+        let (_, topology) = regular_topology();
+        let corners: Vec<HalfedgeId> = topology.mesh.outgoing(VertexId(20)).collect();
+        for (i, &to) in corners.iter().enumerate() {
+            let crossed = fan_crossings(&topology.mesh, corners[0], to).unwrap();
+            assert_eq!(crossed.len(), i);
+        }
+        let elsewhere = topology.mesh.next(corners[0]);
+        let far = topology.mesh.twin(elsewhere).unwrap();
+        assert!(fan_crossings(&topology.mesh, corners[0], far).is_none(), "not a triangle at the vertex");
+    }
+
+    #[test]
+    fn a_corner_is_a_surface_point_of_weight_one() {
+        let (_, topology) = regular_topology();
+        let mesh = &topology.mesh;
+        for h in mesh.halfedges().take(9) {
+            assert_eq!(corner_point(h).position(mesh), mesh.position(mesh.origin(h)));
+            assert_eq!(corner_point(h).face, mesh.face(h));
+        }
+    }
 }

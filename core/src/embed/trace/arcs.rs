@@ -6,13 +6,12 @@
 
 use glam::DVec3;
 
-pub use crate::embed::trace::error::TraceError;
+use crate::embed::trace::error::TraceError;
 use crate::embed::trace::isoline_points::{Point, degenerate_crossing, isoline_points, snap_vertices};
 use crate::embed::trace::isolines::{Isolines, Step, map_rounding, nodes_at};
 use crate::embed::trace::overlay::{Meeting, overlay};
-pub use crate::embed::trace::separatrix_matching::ArcChain;
-use crate::embed::trace::separatrix_matching::{ChainEnd, LENGTH_TOLERANCE, SeparatrixMatching};
-pub use crate::embed::trace::traced_layout::TracedLayout;
+use crate::embed::trace::separatrix_matching::{ArcChain, ChainEnd, LENGTH_TOLERANCE, SeparatrixMatching};
+use crate::embed::trace::traced_layout::TracedLayout;
 use crate::layout::QuadLayout;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::SeamlessMap;

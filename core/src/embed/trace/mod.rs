@@ -10,9 +10,11 @@ mod isoline_points;
 mod isolines;
 mod overlay;
 pub(in crate::embed) mod rectangles;
-mod separatrix_matching;
-mod traced_layout;
+pub(in crate::embed) mod separatrix_matching;
+pub(in crate::embed) mod traced_layout;
 
+#[cfg(test)]
+mod isoline_tests;
 #[cfg(test)]
 mod samples;
 #[cfg(test)]

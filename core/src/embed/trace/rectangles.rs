@@ -8,11 +8,10 @@ use glam::DVec2;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::dual::Mark;
 use crate::embed::trace::isolines::corner_uv;
 use crate::embed::trace::traced_layout::TracedLayout;
-use crate::layout::{ArcLookup, PatchMap, QuadLayout, Submesh, patch_faces, patch_sides};
-use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh, TriMeshError};
+use crate::layout::{ArcLookup, PatchDisc, PatchMap, PatchShapeError, QuadLayout, count_flipped};
+use crate::mesh::{BreadthFirst, FaceId, HalfedgeId, TriMesh};
 use crate::param::{Transition, turn};
 use crate::progress::{Cancelled, Progress};
 
@@ -22,20 +21,9 @@ const ROUNDING: f64 = 1e-9;
 /// Why the patches of a traced layout are not rectangles.
 #[derive(Debug, Error)]
 pub enum RectangleError {
-    /// The border of a patch does not consist of its four arcs.
-    #[error("the border of patch {patch} does not consist of its four arcs")]
-    Sides {
-        /// The patch.
-        patch: usize,
-    },
-    /// The triangles of a patch are not a manifold.
-    #[error("patch {patch} is not a disc: {source}")]
-    NoDisc {
-        /// The patch.
-        patch: usize,
-        /// Why not.
-        source: TriMeshError,
-    },
+    /// A patch is not a disc with the four sides of the layout.
+    #[error(transparent)]
+    Shape(#[from] PatchShapeError),
     /// A patch is not a rectangle in the map.
     #[error("patch {patch} deviates by {deviation} from a rectangle of size {size} in the map")]
     NotRectangle {
@@ -78,13 +66,9 @@ fn map_rectangle(
     patch: usize,
 ) -> Result<PatchMap, RectangleError> {
     let embedding = &traced.embedding;
-    let on_arc = |h: u32| embedding.mesh.mark(h) != Mark::Free;
-    let faces = patch_faces(&embedding.mesh, embedding.seeds[patch], on_arc);
-    let submesh =
-        Submesh::cut_out(&embedding.mesh, &faces, on_arc).map_err(|source| RectangleError::NoDisc { patch, source })?;
-    let sides = patch_sides(layout, lookup, &submesh, patch).ok_or(RectangleError::Sides { patch })?;
+    let PatchDisc { submesh, faces, sides } = PatchDisc::cut_out(layout, embedding, lookup, patch)?;
     if submesh.mesh.euler_characteristic() != 1 {
-        return Err(RectangleError::Sides { patch });
+        return Err(PatchShapeError::Sides { patch }.into());
     }
     let (mut uv, gap) = one_chart(traced, &submesh.mesh, &faces);
     let (size, border_deviation) = align_to_rectangle(&mut uv, &sides);
@@ -92,9 +76,9 @@ fn map_rectangle(
     if deviation.is_nan() || deviation > ROUNDING * (size.x + size.y) {
         return Err(RectangleError::NotRectangle { patch, size, deviation });
     }
-    let flipped = crate::layout::flipped(&submesh.mesh, &uv);
+    let flipped = count_flipped(&submesh.mesh, &uv);
     let base_face = faces.iter().map(|&f| embedding.base_face[f as usize]).collect();
-    Ok(PatchMap { mesh: submesh.mesh, whole: submesh.whole, base_face, uv, size, flipped })
+    Ok(PatchMap { mesh: submesh.mesh, parent: submesh.parent, base_face, uv, size, flipped })
 }
 
 /// The coordinates of all vertices of a patch in the chart of its first triangle, and the largest distance between the

@@ -92,7 +92,7 @@ fn check_patch_maps(mesh: &TriMesh, layout: &QuadLayout, traced: &TracedLayout, 
     for (patch, map) in layout.patches.iter().zip(maps) {
         // A patch may have a vertex of the surface several times on its border.
         let mut uv: BTreeMap<u32, Vec<DVec2>> = BTreeMap::new();
-        for (&v, &w) in map.whole.iter().zip(&map.uv) {
+        for (&v, &w) in map.parent.iter().zip(&map.uv) {
             uv.entry(v).or_default().push(w);
         }
         let corners = [DVec2::ZERO, DVec2::new(map.size.x, 0.0), map.size, DVec2::new(0.0, map.size.y)];

@@ -2,7 +2,7 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
 use crate::embed::trace::arcs::{FlippedTriangles, preview_arcs, trace_arcs};
-use crate::embed::trace::completion::CompletedLayout;
+use crate::embed::trace::completion::{CompletedLayout, CompletionError, complete_layout};
 use crate::embed::trace::error::TraceError;
 use crate::embed::trace::isolines::{Isolines, corner_uv, map_rounding, nodes_at};
 use crate::embed::trace::rectangles::{RectangleError, map_rectangles};
@@ -10,6 +10,7 @@ use crate::embed::trace::samples::{self, Sample};
 use crate::embed::trace::testing::{
     area, completed, cycles, irregular, rectangles, sizes_are, trace, trace_rectangles,
 };
+use crate::layout::PatchShapeError;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::param::turn;
 use crate::progress::Progress;
@@ -352,6 +353,47 @@ fn a_node_among_flipped_triangles_has_as_many_isolines_as_arcs() {
             assert!((whole - area(&s.mesh)).abs() < 1e-9);
         }
     }
+}
+
+#[test]
+fn an_isoline_that_does_not_end_is_an_error_of_completion() {
+    let s = samples::slanted_torus(2, 0.0);
+    let error = complete_layout(&s.mesh, &s.map, &s.nodes, 1.0).unwrap_err();
+    assert!(matches!(error, CompletionError::Endless { node: 0 }), "{error}");
+}
+
+#[test]
+fn completion_without_a_singular_node_is_an_error() {
+    let s = samples::cube(4, 1, 0.0);
+    assert!(complete_layout(&s.mesh, &s.map, &s.nodes[1..], 100.0).is_err());
+}
+
+#[test]
+fn patches_that_form_two_fans_around_a_node_are_an_error() {
+    let mut s = samples::cone(5, 4, 0.0);
+    s.layout.patches.remove(2);
+    s.layout.patches.remove(0);
+    assert!(matches!(trace(&s), Err(TraceError::Order { node: 0 })));
+}
+
+#[test]
+fn patches_beside_other_arcs_are_an_error() {
+    let s = samples::cube(4, 1, 0.0);
+    let traced = trace(&s).unwrap();
+    let mut other = s.layout.clone();
+    other.patches.swap(0, 1);
+    let error = map_rectangles(&other, &traced, &Progress::new()).unwrap_err();
+    assert!(matches!(error, RectangleError::Shape(PatchShapeError::Sides { patch: 0 | 1 })), "{error}");
+}
+
+#[test]
+fn a_cancelled_mapping_to_rectangles_says_so() {
+    let s = samples::square(4, 1, 0.0);
+    let traced = trace(&s).unwrap();
+    let progress = Progress::new();
+    progress.cancel();
+    let error = map_rectangles(&s.layout, &traced, &progress).unwrap_err();
+    assert!(matches!(error, RectangleError::Cancelled(_)), "{error}");
 }
 
 proptest! {

@@ -40,7 +40,7 @@ impl LayoutFile {
             let [p, q] = of.nodes;
             ends.push([ArcEnd { node: p, slot: slot(first)? }, ArcEnd { node: q, slot: slot(last)? }]);
         }
-        Paths { base, mesh, base_face }.write(source, &layout.nodes, nodes, arcs, &ends)
+        Refinement { base, mesh, base_face }.write(source, &layout.nodes, nodes, arcs, &ends)
     }
 
     /// A layout, complete or partial, embedded on a refinement of `base`. Nothing is fixed.
@@ -54,7 +54,7 @@ impl LayoutFile {
         embedding: &PartialEmbedding,
     ) -> Result<Self, LayoutFileError> {
         let PartialEmbedding { mesh, base_face, nodes, layout_nodes, arcs, ends, .. } = embedding;
-        Paths { base, mesh, base_face }.write(source, layout_nodes, nodes, arcs, ends)
+        Refinement { base, mesh, base_face }.write(source, layout_nodes, nodes, arcs, ends)
     }
 }
 
@@ -89,7 +89,7 @@ fn slots(
 
 /// Position on the mesh of a vertex of a refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Spot {
+enum Position {
     Vertex(VertexId),
     /// With the fraction along the half-edge [`TriMesh::halfedge`].
     Edge(EdgeId, f64),
@@ -97,13 +97,13 @@ enum Spot {
 }
 
 /// A mesh and a refinement of it.
-struct Paths<'a> {
+struct Refinement<'a> {
     base: &'a TriMesh,
     mesh: &'a RefinedMesh,
     base_face: &'a [u32],
 }
 
-impl Paths<'_> {
+impl Refinement<'_> {
     /// The file for nodes and arcs given by vertices of the refinement.
     fn write(
         &self,
@@ -114,20 +114,20 @@ impl Paths<'_> {
         ends: &[[ArcEnd; 2]],
     ) -> Result<LayoutFile, LayoutFileError> {
         let crossings: Vec<Vec<(u32, Option<HalfedgeId>)>> =
-            arcs.iter().enumerate().map(|(a, path)| self.places(a, path)).collect::<Result<_, _>>()?;
+            arcs.iter().enumerate().map(|(a, path)| self.crossings(a, path)).collect::<Result<_, _>>()?;
         let used = nodes.iter().copied().chain(crossings.iter().flatten().map(|c| c.0));
-        let spots = self.spots(used.collect())?;
+        let positions = self.positions(used.collect())?;
         let mut file = LayoutFile::new(source, self.base);
         for (&v, layout_node) in nodes.iter().zip(layout_nodes) {
             file.nodes.push(FileNode {
-                at: self.point(v, spots[&v]),
+                at: self.point(v, positions[&v]),
                 valence: layout_node.valence as u32,
                 fixed: false,
             });
         }
         for (places, &ends) in crossings.into_iter().zip(ends) {
-            let point = |(v, crossed): (u32, Option<HalfedgeId>)| match (spots[&v], crossed) {
-                (Spot::Edge(e, t), Some(halfedge)) => {
+            let point = |(v, crossed): (u32, Option<HalfedgeId>)| match (positions[&v], crossed) {
+                (Position::Edge(e, t), Some(halfedge)) => {
                     let t = if self.base.halfedge(e) == halfedge { t } else { 1.0 - t };
                     PathPoint::Crossing(Crossing { halfedge, t })
                 }
@@ -140,7 +140,7 @@ impl Paths<'_> {
 
     /// The vertices at which an arc crosses an edge, each with the half-edge in the triangle that the arc leaves, and
     /// the vertices of the mesh on its path. Empty for a boundary arc.
-    fn places(&self, arc: usize, path: &[u32]) -> Result<Vec<(u32, Option<HalfedgeId>)>, LayoutFileError> {
+    fn crossings(&self, arc: usize, path: &[u32]) -> Result<Vec<(u32, Option<HalfedgeId>)>, LayoutFileError> {
         let mut places = Vec::new();
         let mut current = None;
         let mut on_boundary = true;
@@ -184,23 +184,23 @@ impl Paths<'_> {
     }
 
     /// The positions of the vertices `used`. Those on an edge are separated by at least [`MIN_SEPARATION`].
-    fn spots(&self, used: Vec<u32>) -> Result<HashMap<u32, Spot>, LayoutFileError> {
+    fn positions(&self, used: Vec<u32>) -> Result<HashMap<u32, Position>, LayoutFileError> {
         let n_base = self.base.n_vertices() as u32;
-        let mut spots: HashMap<u32, Spot> = HashMap::new();
+        let mut positions: HashMap<u32, Position> = HashMap::new();
         for v in used {
             let face = FaceId(self.base_face[self.mesh.outgoing(v)[0] as usize / 3]);
-            spots.insert(v, if v < n_base { Spot::Vertex(VertexId(v)) } else { Spot::Inside(face) });
+            positions.insert(v, if v < n_base { Position::Vertex(VertexId(v)) } else { Position::Inside(face) });
         }
         for e in self.base.edges() {
             let chain = self.chain(self.base.halfedge(e)).ok_or(LayoutFileError::OtherRefinement)?;
             let along = self.along(&chain);
-            let on_edge: Vec<usize> = (1..chain.len() - 1).filter(|&i| spots.contains_key(&chain[i])).collect();
+            let on_edge: Vec<usize> = (1..chain.len() - 1).filter(|&i| positions.contains_key(&chain[i])).collect();
             let fractions = separated(on_edge.iter().map(|&i| along[i]).collect());
             for (i, t) in on_edge.into_iter().zip(fractions) {
-                spots.insert(chain[i], Spot::Edge(e, t));
+                positions.insert(chain[i], Position::Edge(e, t));
             }
         }
-        Ok(spots)
+        Ok(positions)
     }
 
     /// The vertices of the refinement along a half-edge of the mesh, its ends included.
@@ -230,14 +230,14 @@ impl Paths<'_> {
     }
 
     /// The point of the mesh where a vertex lies.
-    fn point(&self, v: u32, spot: Spot) -> SurfacePoint {
-        match spot {
-            Spot::Vertex(v) => {
+    fn point(&self, v: u32, position: Position) -> SurfacePoint {
+        match position {
+            Position::Vertex(v) => {
                 let h = self.base.vertex_halfedge(v);
                 corner_weights(h, [1.0, 0.0, 0.0])
             }
-            Spot::Edge(e, t) => corner_weights(self.base.halfedge(e), [1.0 - t, t, 0.0]),
-            Spot::Inside(face) => {
+            Position::Edge(e, t) => corner_weights(self.base.halfedge(e), [1.0 - t, t, 0.0]),
+            Position::Inside(face) => {
                 let [a, b, c] = self.base.face_vertices(face).map(|v| self.base.position(v));
                 let p = self.mesh.positions[v as usize];
                 let normal = self.base.face_normal(face);
@@ -275,4 +275,23 @@ fn separated(mut fractions: Vec<f64>) -> Vec<f64> {
         most = *t - gap;
     }
     fractions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn separated_fractions_keep_their_order_and_distance() {
+        let fractions = separated(vec![0.0, 0.0, 0.5, 0.5, 1.0]);
+        assert!(fractions[0] > 0.0 && fractions[4] < 1.0);
+        assert!(fractions.windows(2).all(|w| w[1] - w[0] > 0.5 * MIN_SEPARATION), "{fractions:?}");
+        assert!((fractions[2] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn fractions_that_are_apart_do_not_move() {
+        assert_eq!(separated(vec![0.1, 0.2, 0.9]), [0.1, 0.2, 0.9]);
+        assert_eq!(separated(Vec::new()), Vec::<f64>::new());
+    }
 }

@@ -27,7 +27,8 @@ impl TriangleSoup {
             let n = component.len();
             let against = component.iter().filter(|&&(_, turned)| turned).count();
             let volume = if boxes[i].is_some() { self.volume(component) } else { 0.0 };
-            // Whether the orientation of the component's first triangle is the wrong one.
+            // Whether the first triangle is to be reversed: against the majority if the component is open, or may bound a
+            // cavity; else if the volume is negative.
             let flip_first = if volume == 0.0 || (volume < 0.0 || against > 0) && is_enclosed(&boxes, i) {
                 2 * against > n
             } else {
@@ -105,9 +106,9 @@ impl TriangleSoup {
     /// Six times the volume inside a closed component, as oriented by its first triangle.
     fn volume(&self, component: &[(u32, bool)]) -> f64 {
         let position = |v: u32| self.raw.positions[v as usize];
-        let center = component.first().map_or(DVec3::ZERO, |&(f, _)| position(self.faces[f as usize][0]));
+        let centre = component.first().map_or(DVec3::ZERO, |&(f, _)| position(self.faces[f as usize][0]));
         let signed = component.iter().map(|&(f, turned)| {
-            let [a, b, c] = self.faces[f as usize].map(|v| position(v) - center);
+            let [a, b, c] = self.faces[f as usize].map(|v| position(v) - centre);
             let six = a.dot(b.cross(c));
             if turned { -six } else { six }
         });

@@ -42,3 +42,36 @@ impl Distortion {
         self.ratio() >= FLIPPED || self.similarity.x <= 0.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn distortion(u: [f64; 2], v: [f64; 2]) -> Distortion {
+        Distortion::new([u, v].map(DVec2::from_array), DVec2::new(2.0, 4.0))
+    }
+
+    #[test]
+    fn target_gradients_are_undistorted() {
+        let at_target = distortion([2.0, 0.0], [0.0, 4.0]);
+        assert_eq!((at_target.similarity, at_target.reflection), (DVec2::X, DVec2::ZERO));
+        assert_eq!(at_target.ratio(), 0.0);
+        assert!(!at_target.is_flipped());
+    }
+
+    #[test]
+    fn reflected_and_nearly_degenerate_images_are_flipped() {
+        assert!(distortion([2.0, 0.0], [0.0, -4.0]).is_flipped());
+        assert!(distortion([2.0, 0.0], [0.0, 4.0 / 500.0]).is_flipped());
+        assert!(!distortion([2.0, 0.0], [0.0, 4.0 / 300.0]).is_flipped());
+        assert!(distortion([0.0, 0.0], [0.0, 0.0]).is_flipped());
+        assert!(distortion([f64::NAN, 0.0], [0.0, 4.0]).is_flipped());
+    }
+
+    #[test]
+    fn images_turned_by_half_a_turn_count_as_flipped() {
+        let turned = distortion([-2.0, 0.0], [0.0, -4.0]);
+        assert_eq!(turned.ratio(), 0.0);
+        assert!(turned.is_flipped());
+    }
+}

@@ -93,9 +93,9 @@ pub struct FlipRemoval {
     /// The free variables.
     pub y: Vec<f64>,
     /// Number of flipped triangles before.
-    pub folds_before: usize,
+    pub flipped_before: usize,
     /// Triangles that remain flipped, ascending.
-    pub folds: Vec<FlippedTriangle>,
+    pub flipped: Vec<FlippedTriangle>,
     /// The energy before.
     pub energy_before: f64,
     /// The energy after.
@@ -118,8 +118,8 @@ pub fn remove_flips(
     let energy_before = problem.energy(y);
     let mut out = FlipRemoval {
         y: y.to_vec(),
-        folds_before: flipped.len(),
-        folds: Vec::new(),
+        flipped_before: flipped.len(),
+        flipped: Vec::new(),
         energy_before,
         energy: energy_before,
     };
@@ -144,9 +144,9 @@ pub fn remove_flips(
         }
     }
     let remaining = problem.flipped(&problem.reduction.expand(&out.y));
-    out.folds =
+    out.flipped =
         remaining.into_iter().map(|t| FlippedTriangle { triangle: t, reason: reason(problem, &crowded, t) }).collect();
-    let (before, after) = (out.folds_before, out.folds.len());
+    let (before, after) = (out.flipped_before, out.flipped.len());
     tracing::debug!(before, after, energy_before, out.energy, "flipped triangles removed");
     Ok(out)
 }

@@ -166,14 +166,14 @@ fn constrained(n: u32) -> Sheet {
 fn removed(sheet: &Sheet) -> (Vec<f64>, FlipRemoval) {
     let y = solved(&sheet.problem());
     let out = remove_flips(&sheet.problem(), &y, Effort::Thorough, &Progress::new()).unwrap();
-    assert_eq!(out.folds.len(), sheet.problem().flipped(&sheet.reduction.expand(&out.y)).len());
+    assert_eq!(out.flipped.len(), sheet.problem().flipped(&sheet.reduction.expand(&out.y)).len());
     (y, out)
 }
 
 #[test]
 fn dragged_vertex_leaves_no_flipped_triangle() {
     let (_, out) = removed(&dragged(24));
-    assert!(out.folds_before > 0 && out.folds.is_empty());
+    assert!(out.flipped_before > 0 && out.flipped.is_empty());
     assert!(out.energy > out.energy_before && out.energy < 3.0 * out.energy_before);
 }
 
@@ -181,7 +181,7 @@ fn dragged_vertex_leaves_no_flipped_triangle() {
 fn map_without_flips_is_returned_unchanged() {
     let sheet = pinned(6, &[(at(6, 3, 3), DVec2::new(3.2, 3.1))]);
     let (y, out) = removed(&sheet);
-    assert_eq!((out.y, out.folds_before), (y, 0));
+    assert_eq!((out.y, out.flipped_before), (y, 0));
 }
 
 #[test]
@@ -189,8 +189,8 @@ fn swapped_vertices_are_reported_as_not_resolved() {
     let n = 10;
     let pins = [(at(n, 5, 5), DVec2::new(6.0, 5.0)), (at(n, 6, 5), DVec2::new(5.0, 5.0))];
     let (_, out) = removed(&pinned(n, &pins));
-    assert!(!out.folds.is_empty() && out.folds.len() <= out.folds_before);
-    assert!(out.folds.iter().all(|f| f.reason == FlipReason::NotResolved));
+    assert!(!out.flipped.is_empty() && out.flipped.len() <= out.flipped_before);
+    assert!(out.flipped.iter().all(|f| f.reason == FlipReason::NotResolved));
 }
 
 #[test]
@@ -207,8 +207,8 @@ fn flips_beside_unresolvable_ones_are_removed() {
         let vertices = sheet.triangles[t as usize].vertices;
         vertices.contains(&at(n, 15, 15)) || vertices.contains(&at(n, 16, 15))
     };
-    assert!(!out.folds.is_empty() && out.folds.len() < out.folds_before);
-    assert!(out.folds.iter().all(|f| swapped(f.triangle)), "{:?}", out.folds);
+    assert!(!out.flipped.is_empty() && out.flipped.len() < out.flipped_before);
+    assert!(out.flipped.iter().all(|f| swapped(f.triangle)), "{:?}", out.flipped);
 }
 
 #[test]
@@ -217,14 +217,14 @@ fn triangle_determined_by_constraints_is_reported_as_fixed() {
     let pins = [(4, 4, 4.0, 4.0), (5, 4, 4.0, 5.0), (5, 5, 5.0, 4.0)];
     let (_, out) = removed(&pinned(n, &pins.map(|(i, j, x, y)| (at(n, i, j), DVec2::new(x, y)))));
     let fixed = FlippedTriangle { triangle: 2 * (4 * n + 4), reason: FlipReason::Fixed };
-    assert!(out.folds.contains(&fixed), "{:?}", out.folds);
+    assert!(out.flipped.contains(&fixed), "{:?}", out.flipped);
 }
 
 #[test]
 fn constrained_vertices_move_together() {
     let sheet = constrained(30);
     let (_, out) = removed(&sheet);
-    assert!(out.folds_before > 0 && out.folds.is_empty());
+    assert!(out.flipped_before > 0 && out.flipped.is_empty());
     assert!(out.energy < 2.0 * out.energy_before);
 }
 
@@ -242,7 +242,7 @@ fn flips_are_removed_across_seams_with_quarter_turns() {
             .any(|&(x, _)| { sheet.reduction.expression(x as usize).0.iter().any(|&(_, c)| c == -1.0) })
     );
     let (_, out) = removed(&sheet);
-    assert!(out.folds_before > 0 && out.folds.is_empty());
+    assert!(out.flipped_before > 0 && out.flipped.is_empty());
     assert!(out.energy < 1.5 * out.energy_before);
 }
 
@@ -250,13 +250,13 @@ fn flips_are_removed_across_seams_with_quarter_turns() {
 fn vertex_of_too_high_valence_is_reported() {
     let reason = FlipReason::HighValence { vertex: 0, quarters: 12, triangles: 6 };
     let (_, out) = removed(&fan(6, 12, 6, &[]));
-    assert_eq!(out.folds.len(), 6);
-    assert!(out.folds.iter().all(|f| f.reason == reason));
+    assert_eq!(out.flipped.len(), 6);
+    assert!(out.flipped.iter().all(|f| f.reason == reason));
     // Flipped triangles elsewhere are removed, and six triangles can span eleven quarter turns.
     let pins = [(4, 0, 2, DVec2::new(7.5, 1.0))];
     let (_, out) = removed(&fan(6, 12, 6, &pins));
-    assert!(out.folds_before > out.folds.len() && out.folds.iter().all(|f| f.reason == reason), "{out:?}");
-    assert!(removed(&fan(6, 11, 6, &[])).1.folds.is_empty());
+    assert!(out.flipped_before > out.flipped.len() && out.flipped.iter().all(|f| f.reason == reason), "{out:?}");
+    assert!(removed(&fan(6, 11, 6, &[])).1.flipped.is_empty());
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn removal_can_be_cancelled_and_returns_nan_unchanged() {
     let progress = Progress::new();
     let nonsense = vec![f64::NAN; sheet.reduction.n_free()];
     let out = remove_flips(&sheet.problem(), &nonsense, Effort::Thorough, &progress).unwrap();
-    assert!(!out.folds.is_empty() && out.y.iter().all(|y| y.is_nan()));
+    assert!(!out.flipped.is_empty() && out.y.iter().all(|y| y.is_nan()));
     progress.cancel();
     assert_eq!(remove_flips(&sheet.problem(), &solved(&sheet.problem()), Effort::Thorough, &progress), Err(Cancelled));
 }

@@ -275,4 +275,21 @@ mod tests {
         assert_eq!(DENSITY.value(&[1.0, 1.0, 1.0, 1.0]), None);
         assert_eq!(DENSITY.value(&[1.0, 0.0, 0.0, -1.0]), None);
     }
+
+    #[test]
+    fn density_is_least_at_the_target() {
+        let weights = DistortionWeights { anisotropy: 1.0, size: 0.4 };
+        let density = EnergyDensity::new(weights, [2.0, 0.5]);
+        assert!((density.value(&[1.0, 0.0, 0.0, 1.0]).unwrap() - 1.4).abs() < 1e-12);
+        for other in [[1.1, 0.0, 0.0, 1.1], [1.0, 0.1, 0.0, 1.0], [0.9, 0.0, 0.0, 1.1]] {
+            assert!(density.value(&other).unwrap() > 1.4 + 1e-6, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn anisotropy_share_interpolates_from_the_isotropic_energy() {
+        let weights = DistortionWeights { anisotropy: 5.0, size: 0.4 };
+        let shares = [0.0, 0.5, 1.0].map(|share| weights.with_anisotropy_share(share).anisotropy);
+        assert_eq!(shares, [1.0, 3.0, 5.0]);
+    }
 }

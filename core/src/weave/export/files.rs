@@ -32,10 +32,10 @@ impl Export {
             .maps
             .iter()
             .map(|map| {
-                let inner = map.mesh.positions()[map.whole.len()..].iter();
+                let inner = map.mesh.positions()[map.parent.len()..].iter();
                 let first = positions.len() as u32;
                 positions.extend(inner);
-                map.whole.iter().copied().chain(first..positions.len() as u32).collect()
+                map.parent.iter().copied().chain(first..positions.len() as u32).collect()
             })
             .collect();
         for p in positions {

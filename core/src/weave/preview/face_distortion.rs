@@ -75,7 +75,7 @@ mod tests {
         let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.5, 0.5, 0.0)];
         let mesh = TriMesh::from_faces(points.to_vec(), &[[0, 1, 3], [0, 3, 2]]).unwrap();
         let map = PatchMap {
-            whole: vec![0, 1, 2, 3],
+            parent: vec![0, 1, 2, 3],
             base_face: vec![1, 1],
             uv: points.iter().map(|p| DVec2::new(p.x, p.y)).collect(),
             size: DVec2::ONE,

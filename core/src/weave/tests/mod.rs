@@ -61,7 +61,7 @@ fn three_suggestions_separate_the_corners_of_a_cube() {
     let mesh = &s.model().mesh;
     let source = s.design().mesh.clone();
     let file = LayoutFile::from_embedding(source, mesh, &export.layout, &export.initial.initial_embedding).unwrap();
-    let (again, _) = file.draw(mesh).unwrap().to_embedding().unwrap();
+    let (again, _) = file.partial_embedding(mesh).unwrap().to_embedding().unwrap();
     assert_eq!((again.nodes, again.patches.len()), (export.layout.nodes, 6));
 }
 
@@ -203,13 +203,13 @@ fn pins_identify_their_parts_and_follow_undo() {
     let progress = Progress::new();
     let mut s = Session::open(builtin("rounded-cube").unwrap(), source, Options::default(), &progress).unwrap();
     s.weave_to(Goal::Separated, &progress).unwrap();
-    let drawn = initial_layout(&s, &progress).unwrap();
-    let pins = vec![drawn.node_pin(5).unwrap(), drawn.arc_pin(3).unwrap()];
+    let initial = initial_layout(&s, &progress).unwrap();
+    let pins = vec![initial.node_pin(5).unwrap(), initial.arc_pin(3).unwrap()];
     s.set_pins(pins.clone());
     let text = serde_json::to_string(s.design()).unwrap();
     let read: Design = serde_json::from_str(&text).unwrap();
     assert_eq!(read.pins, pins);
-    let parts = drawn.pinned(&read.pins);
+    let parts = initial.pinned(&read.pins);
     let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
     assert_eq!((set(&parts.nodes), set(&parts.arcs)), (vec![5], vec![3]));
 
@@ -266,13 +266,14 @@ fn a_design_opens_with_and_without_a_proxy() {
     let design = s.design().clone();
     let curves = |d: &Design| d.strips.iter().map(|s| s.curve.clone()).collect::<Vec<_>>();
     for proxy in [0, 1500, 3000, 40] {
-        let options = Options { proxy, ..design.options };
-        let other = Session::resume(loaded(torus(96, 48)), Design { options, ..design.clone() }, &progress).unwrap();
+        let changed = Options { proxy, ..design.options };
+        let other =
+            Session::resume(loaded(torus(96, 48)), Design { options: changed, ..design.clone() }, &progress).unwrap();
         assert_eq!(curves(other.design()), curves(&design), "{proxy}");
         assert_eq!(other.design().proxy.is_some(), other.model().proxy.is_some());
         assert_eq!(other.woven().arrangement.crossings.len(), s.woven().arrangement.crossings.len(), "{proxy}");
-        let drawn = ExportOptions { embedding: None, ..ExportOptions::default() };
-        assert!(export(&other, &drawn, &progress).is_ok(), "{proxy}");
+        let options = ExportOptions { embedding: None, ..ExportOptions::default() };
+        assert!(export(&other, &options, &progress).is_ok(), "{proxy}");
     }
     assert_eq!(Session::resume(loaded(torus(96, 48)), design, &progress).unwrap().model().mesh.n_faces(), 2000);
 }
@@ -298,14 +299,14 @@ fn a_layout_embedded_on_the_proxy_has_its_quads_on_the_mesh() {
         };
         let on_mesh = export(&s, &ExportOptions::default(), &progress).unwrap();
         assert_eq!(on_mesh.mesh_role, MeshRole::Design);
-        let drawn = initial_layout_as_woven(&s, &progress).unwrap();
-        assert_eq!(drawn.mesh_role, MeshRole::Proxy);
+        let initial = initial_layout_as_woven(&s, &progress).unwrap();
+        assert_eq!(initial.mesh_role, MeshRole::Proxy);
         let mut watch = |_: &_| Next::Continue;
-        let carried = export_layout(&s, &drawn, None, &ExportOptions::default(), &progress, &mut watch).unwrap();
+        let on_proxy = export_layout(&s, &initial, None, &ExportOptions::default(), &progress, &mut watch).unwrap();
         let count = |e: &Export| (e.layout.patches.len(), e.layout.nodes.len(), e.layout.n_irregular());
-        assert_eq!(count(&on_mesh), count(&carried));
-        assert!(far(&on_mesh) < 1e-9 && far(&carried) < 1e-9, "{} {}", far(&on_mesh), far(&carried));
-        for (e, name) in [(on_mesh, "mesh"), (carried, "proxy")] {
+        assert_eq!(count(&on_mesh), count(&on_proxy));
+        assert!(far(&on_mesh) < 1e-9 && far(&on_proxy) < 1e-9, "{} {}", far(&on_mesh), far(&on_proxy));
+        for (e, name) in [(on_mesh, "mesh"), (on_proxy, "proxy")] {
             assert_eq!(crate::quad::quality(&e.quads).0, 0, "folded on the {name}");
         }
     }

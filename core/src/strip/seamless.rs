@@ -1,18 +1,18 @@
-//! The seamless map with the curves as exact isolines: along each edge of a curve the coordinate that the curve
-//! keeps is equal at both ends (Campen, Quad Layouts, section 8.2.2).
+//! The seamless map with the curves as exact isolines: one coordinate is constrained to be equal at both ends of each edge of
+//! a curve (Campen, Quad Layouts, section 8.2.2).
 
-use super::StripError;
+use super::error::StripError;
 use crate::field::{CrossField, EdgePath, Step};
 use crate::mesh::{HalfedgeId, TriMesh};
 use crate::param::{CoordinateConstraint, Objective, SeamlessMap, SeamlessSystem};
 use crate::progress::Progress;
-use crate::surface::Metric;
-use crate::surface::SurfacePoint;
+use crate::surface::{Metric, SurfacePoint};
 
-/// Errors of length and of direction count alike: strips are to be as wide as the surface has room.
+/// Anisotropy of the objective: 1 weights errors of length and of direction equally, so that the map stays close to isometric
+/// and widths are those of the surface.
 const ANISOTROPY: f64 = 1.0;
 
-/// Solves for the coordinates of all corners.
+/// The map of the whole mesh.
 pub(super) fn solve(
     mesh: &TriMesh,
     metric: &Metric,
@@ -27,9 +27,9 @@ pub(super) fn solve(
     Ok(system.solve(metric, field, &objective, progress)?.map)
 }
 
-/// The half-edges of a curve's step, left and right, each with the coordinate (0 or 1) that is to be constant along
-/// it: on the left the one whose isolines are nearest to the curve, on the right its continuation.
-pub(super) fn kept_coordinates(
+/// The half-edges left and right of a step, each with the coordinate (0: u, 1: v) to be constant along it: on the left the one
+/// whose isolines are closest to the direction of the curve, on the right its continuation across the edge.
+pub(super) fn constant_coordinates(
     mesh: &TriMesh,
     metric: &Metric,
     field: &CrossField,
@@ -40,23 +40,24 @@ pub(super) fn kept_coordinates(
     let (left, right) = (step.left(mesh), step.right(mesh));
     let on_left = left.map(|h| (h, nearest(h)));
     let on_right = right.map(|r| match on_left {
-        Some((l, kept)) => (r, (i32::from(kept) + field.jump_across(mesh, l)).rem_euclid(2) as u8),
+        Some((l, axis)) => (r, (i32::from(axis) + field.jump_across(mesh, l)).rem_euclid(2) as u8),
         None => (r, nearest(r)),
     });
     on_left.into_iter().chain(on_right)
 }
 
+/// The constraints that make the paths isolines.
 fn isolines(mesh: &TriMesh, metric: &Metric, field: &CrossField, paths: &[EdgePath]) -> Vec<CoordinateConstraint> {
     let at = |h: HalfedgeId| {
         let mut weights = [0.0; 3];
         weights[h.index() % 3] = 1.0;
         SurfacePoint { face: mesh.face(h), weights }
     };
-    // What holds on one side holds on the other by the seam's equations.
-    let kept = |(&step, &tangent_offset)| kept_coordinates(mesh, metric, field, step, tangent_offset).next();
+    // On one side of the edge only: for the other side the equation follows from the seam's transition.
+    let constant = |(&step, &tangent_offset)| constant_coordinates(mesh, metric, field, step, tangent_offset).next();
     let steps = paths.iter().flat_map(|p| p.steps.iter().zip(&p.tangent_offset));
     steps
-        .filter_map(kept)
+        .filter_map(constant)
         .map(|(h, axis)| CoordinateConstraint {
             from: at(h),
             crossed: Vec::new(),

@@ -380,11 +380,11 @@ mod tests {
 
     #[test]
     fn a_geodesic_is_found_again_by_its_angle_and_length() {
-        let mesh = torus(10, 8);
+        let mesh = torus(16, 12);
         let (corners, v) = (Corners::new(&mesh), VertexId(12));
         let mut all = Vec::new();
         let mut unfolding = Unfolding::default();
-        unfolding.all(&mesh, v, |w| mesh.position(w).distance(mesh.position(v)) < 0.2, |g| all.push(g));
+        unfolding.all(&mesh, v, |w| mesh.position(w).distance(mesh.position(v)) < 0.25, |g| all.push(g));
         for g in all.iter().filter(|g| !g.is_edge()) {
             let angle = corners.tangent(&mesh, g.start, g.start_angle());
             let again = unfolding.towards(&mesh, &corners, v, g.target, (angle, g.length), 1e-6).unwrap();

@@ -40,4 +40,14 @@ mod tests {
         assert!(!sets.join(2, 5));
         assert_eq!([0, 1, 2, 3, 4, 5].map(|a| sets.root(a)), [0, 1, 2, 3, 2, 2]);
     }
+
+    #[test]
+    fn as_many_joins_as_numbers_less_one_leave_one_set() {
+        let mut sets = UnionFind::new(50);
+        let joins = (0..200u32).filter(|k| sets.join(7 * k % 50, 11 * k % 50)).count();
+        let mut roots: Vec<u32> = (0..50).map(|a| sets.root(a)).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        assert_eq!(roots.len(), 50 - joins);
+    }
 }

@@ -10,7 +10,7 @@ use plait_core::mesh::TriMesh;
 use plait_core::progress::Progress;
 use plait_core::surface::{SurfaceIndex, face_curvature};
 use plait_core::weave::{
-    self, InitialLayout, MeshRole, PinnedParts, Session, WeaveError, embedding_polylines, face_distortion,
+    self, InitialLayout, MeshRole, PinnedElements, Session, WeaveError, embedding_polylines, face_distortion,
     largest_aspect, move_ends, smoothed_polyline,
 };
 
@@ -62,7 +62,7 @@ fn preview(layout: &QuadLayout, nodes: &[DVec3], arcs: impl Iterator<Item = Vec<
 }
 
 /// The preview, with the pinned nodes and arcs marked.
-pub(super) fn with_pins(preview: &LayoutPreview, pinned: &PinnedParts) -> LayoutPreview {
+pub(super) fn with_pins(preview: &LayoutPreview, pinned: &PinnedElements) -> LayoutPreview {
     let mut preview = preview.clone();
     for (node, &pinned) in preview.nodes.iter_mut().zip(&pinned.nodes) {
         node.pinned = pinned;

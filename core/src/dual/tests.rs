@@ -1,5 +1,6 @@
 //! Properties of arrangements, on sample and on random curves.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use proptest::prelude::*;
@@ -113,9 +114,17 @@ fn crossing_numbers(a: &Arrangement) -> BTreeMap<[u32; 2], usize> {
     numbers
 }
 
-/// The invariants of an arrangement under retriangulation: its counts, and its regions with the vertices of the surface in
-/// them.
-fn combinatorics(a: &Arrangement) -> (BTreeMap<[u32; 2], usize>, [usize; 2], Vec<(BTreeSet<u32>, i64, usize, usize)>) {
+/// What of an arrangement does not depend on how the surface is triangulated.
+#[derive(Debug, PartialEq)]
+struct Combinatorics {
+    crossings: BTreeMap<[u32; 2], usize>,
+    ends: usize,
+    segments: usize,
+    /// For each region the vertices of the surface in it, Euler characteristic, number of borders and of corners.
+    regions: Vec<(BTreeSet<u32>, i64, usize, usize)>,
+}
+
+fn combinatorics(a: &Arrangement) -> Combinatorics {
     let mut inside = vec![BTreeSet::new(); a.regions.len()];
     for v in 0..a.n_base_vertices() as u32 {
         inside[a.region_left_of(a.refined.vertex_halfedge(v)) as usize].insert(v);
@@ -123,7 +132,7 @@ fn combinatorics(a: &Arrangement) -> (BTreeMap<[u32; 2], usize>, [usize; 2], Vec
     let mut regions: Vec<_> =
         a.regions.iter().zip(inside).map(|(r, v)| (v, r.euler, r.borders.len(), r.corners())).collect();
     regions.sort();
-    (crossing_numbers(a), [a.ends.len(), a.segments.len()], regions)
+    Combinatorics { crossings: crossing_numbers(a), ends: a.ends.len(), segments: a.segments.len(), regions }
 }
 
 /// Steps from a half-edge into the triangle behind it and out by one of its other sides, or `None` at the boundary.
@@ -153,8 +162,8 @@ fn random_curve(mesh: &TriMesh, start: usize, steps: &[(bool, f64)]) -> SurfaceC
     let mut end = Some(queue[0]).filter(|&h| !closed && is_end(h));
     while let Some(h) = queue.pop_front().filter(|_| end.is_none()) {
         for next in [true, false].into_iter().filter_map(|left| onwards(mesh, h, left)) {
-            if !from.contains_key(&next) {
-                from.insert(next, h);
+            if let Entry::Vacant(entry) = from.entry(next) {
+                entry.insert(h);
                 queue.push_back(next);
                 end = end.or(Some(next).filter(|&next| is_end(next)));
             }

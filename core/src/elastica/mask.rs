@@ -16,7 +16,7 @@ pub struct DirectionMask {
 
 impl DirectionMask {
     /// No direction closed.
-    pub fn none() -> Self {
+    pub fn all_open() -> Self {
         Self::default()
     }
 
@@ -49,7 +49,7 @@ impl DirectionMask {
 impl ElasticaGraph {
     /// Closes the geodesics that have an end or their midpoint in `face` and there differ from the line along `direction`
     /// by at most `max_angle` radians. Along a strip, 45° closes the loops equivalent to it and leaves those that cross it.
-    pub fn disable_near(&self, mask: &mut DirectionMask, face: FaceId, direction: DVec3, max_angle: f64) {
+    pub fn close_near(&self, mask: &mut DirectionMask, face: FaceId, direction: DVec3, max_angle: f64) {
         let mesh = &self.mesh;
         for h in mesh.face_halfedges(face) {
             let line = angle_from(mesh.vector(h), direction, mesh.face_normal(face));
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn a_new_mask_closes_nothing() {
-        let mask = DirectionMask::none();
+        let mask = DirectionMask::all_open();
         assert!(mask.is_empty() && mask.is_open(17) && mask.n_closed() == 0);
     }
 }

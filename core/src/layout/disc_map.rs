@@ -169,7 +169,7 @@ fn solve(mesh: &TriMesh, fixed: &[Option<DVec2>], weights: &[f64]) -> Result<Vec
 }
 
 /// The map of a disc onto the unit disc, with each side on an equal share of the circle.
-pub(super) fn round_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveError> {
+pub(super) fn unit_disc_map(disc: &TriMesh, sides: &[Vec<u32>]) -> Result<Vec<DVec2>, SolveError> {
     let mut fixed = vec![None; disc.n_vertices()];
     for (k, side) in sides.iter().enumerate() {
         let along = path_lengths(disc.positions(), side);

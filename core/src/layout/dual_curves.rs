@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::disc_map::round_map;
+use super::disc_map::unit_disc_map;
 use super::embedding::{Embedding, path_lengths};
 use super::patch_disc::{ArcLookup, PatchDisc, PatchShapeError};
 use super::structure::QuadLayout;
@@ -179,7 +179,7 @@ impl DualPatch {
     ) -> Result<Self, DualCurvesError> {
         let PatchDisc { submesh, faces, sides } = PatchDisc::cut_out(layout, embedding, lookup, p)?;
         let mut mesh = RefinedMesh::new(&submesh.mesh);
-        mesh.uv = round_map(&submesh.mesh, &sides).map_err(|source| DualCurvesError::Solve { patch: p, source })?;
+        mesh.uv = unit_disc_map(&submesh.mesh, &sides).map_err(|source| DualCurvesError::Solve { patch: p, source })?;
         for i in 0..2 {
             let ends = [i, i + 2].map(|k| layout.patches[p].sides[k].0);
             let chord = layout.arcs[ends[0] as usize].chord;

@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::disc_map::round_map;
+use super::disc_map::unit_disc_map;
 use super::embedding::{Embedding, path_lengths};
 use super::structure::QuadLayout;
 use super::submesh::Submesh;
@@ -154,7 +154,7 @@ impl RegionPart {
                 .filter(|&v| !disc.is_boundary_vertex(VertexId::new(v)))
                 .map_or_else(|| innermost(&disc), |v| v as u32),
         };
-        mesh.uv = round_map(&disc, &sides).map_err(|source| InitialEmbeddingError::Solve { region: r, source })?;
+        mesh.uv = unit_disc_map(&disc, &sides).map_err(|source| InitialEmbeddingError::Solve { region: r, source })?;
 
         let mut halves = Vec::new();
         for (k, side) in border.iter().enumerate() {

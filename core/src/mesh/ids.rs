@@ -47,3 +47,15 @@ id!(
     /// An undirected edge of a mesh.
     EdgeId
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_id_names_its_kind_and_is_a_plain_number_in_files() {
+        assert_eq!(format!("{:?} {:?}", VertexId(3), HalfedgeId(7)), "vertex3 halfedge7");
+        assert_eq!(serde_json::to_string(&[FaceId(1), FaceId::new(2)]).unwrap(), "[1,2]");
+        assert_eq!(EdgeId::new(9).index(), 9);
+    }
+}

@@ -33,3 +33,25 @@ impl Normalisation {
         (p - self.centre) / self.scale
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bounding_box_is_centred_and_has_diagonal_one() {
+        let corners = [DVec3::new(10.0, 0.0, -1.0), DVec3::new(13.0, 4.0, -1.0), DVec3::new(11.0, 1.0, -1.0)];
+        let normalisation = Normalisation::of(&corners).unwrap();
+        assert_eq!((normalisation.scale, normalisation.centre), (5.0, DVec3::new(11.5, 2.0, -1.0)));
+        let [a, b, _] = corners.map(|p| normalisation.from_file(p));
+        assert!((a + b).length() < 1e-15 && (a.distance(b) - 1.0).abs() < 1e-15);
+        assert!(corners.iter().all(|&p| normalisation.to_file(normalisation.from_file(p)).distance(p) < 1e-14));
+    }
+
+    #[test]
+    fn what_has_no_size_cannot_be_normalised() {
+        assert_eq!(Normalisation::of(&[]), None);
+        assert_eq!(Normalisation::of(&[DVec3::ONE; 3]), None);
+        assert_eq!(Normalisation::of(&[DVec3::splat(-1e300), DVec3::splat(1e300)]), None);
+    }
+}

@@ -67,3 +67,32 @@ pub fn fingerprint(mesh: &TriMesh) -> String {
     }
     format!("{}-{}-{hash:016x}", mesh.n_vertices(), mesh.n_faces())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::torus;
+
+    #[test]
+    fn a_name_is_a_built_in_model_or_a_path() {
+        assert_eq!(MeshSource::from_name("torus"), MeshSource::Builtin("torus".to_owned()));
+        assert_eq!(MeshSource::from_name("torus.obj"), MeshSource::File(PathBuf::from("torus.obj")));
+        let unknown = MeshSource::Builtin("no such model".to_owned());
+        assert!(matches!(unknown.load(Path::new("")), Err(LoadError::UnknownModel(name)) if name == "no such model"));
+    }
+
+    #[test]
+    fn a_fingerprint_changes_with_positions_and_connectivity_but_not_with_rounding() {
+        let mesh = torus(8, 6);
+        let moved = |by: f64| {
+            let mut positions = mesh.positions().to_vec();
+            positions[5].x += by;
+            let faces: Vec<[u32; 3]> = mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0)).collect();
+            TriMesh::from_faces(positions, &faces).unwrap()
+        };
+        assert_eq!(fingerprint(&moved(0.0)), fingerprint(&mesh));
+        assert_ne!(fingerprint(&moved(1e-5)), fingerprint(&mesh));
+        assert_ne!(fingerprint(&torus(6, 8)), fingerprint(&mesh));
+        assert!(fingerprint(&mesh).starts_with("48-96-"));
+    }
+}

@@ -382,7 +382,7 @@ impl TriMesh {
     }
 
     /// Marks the corners of the marked triangles.
-    pub fn corners_of(&self, faces: &[bool]) -> Vec<bool> {
+    pub fn vertices_of_faces(&self, faces: &[bool]) -> Vec<bool> {
         let mut corners = vec![false; self.n_vertices()];
         for v in self.faces().filter(|f| faces[f.index()]).flat_map(|f| self.face_vertices(f)) {
             corners[v.index()] = true;
@@ -391,7 +391,7 @@ impl TriMesh {
     }
 
     /// Marks the triangles that have a marked vertex as a corner.
-    pub fn faces_at(&self, vertices: &[bool]) -> Vec<bool> {
+    pub fn faces_touching(&self, vertices: &[bool]) -> Vec<bool> {
         self.faces().map(|f| self.face_vertices(f).iter().any(|v| vertices[v.index()])).collect()
     }
 

@@ -56,3 +56,33 @@ pub(super) fn vertex_normals(mesh: &TriMesh) -> Vec<DVec3> {
     normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
     normals
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::VertexId;
+    use crate::testing::square;
+
+    #[test]
+    fn corners_and_sides_of_a_square_are_told_from_its_inside() {
+        let mesh = square(3);
+        let kinds = vertex_kinds(&mesh, &vec![false; mesh.n_edges()]);
+        let count = |kind| kinds.iter().filter(|k| **k == kind).count();
+        assert_eq!([VertexKind::Corner, VertexKind::Crease, VertexKind::Smooth].map(count), [4, 8, 4]);
+    }
+
+    #[test]
+    fn the_end_of_a_feature_is_a_corner() {
+        let mesh = square(4);
+        // One sharp edge between two inner vertices.
+        let [a, b] = [VertexId(6), VertexId(7)];
+        let sharp: Vec<bool> = mesh.edges().map(|e| mesh.edge_vertices(e).iter().all(|v| [a, b].contains(v))).collect();
+        let kinds = vertex_kinds(&mesh, &sharp);
+        assert_eq!([a, b].map(|v| kinds[v.index()]), [VertexKind::Corner; 2]);
+    }
+
+    #[test]
+    fn normals_of_a_flat_surface_are_its_own() {
+        assert!(vertex_normals(&square(3)).iter().all(|n| n.distance(DVec3::Z) < 1e-15));
+    }
+}

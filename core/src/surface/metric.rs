@@ -123,3 +123,51 @@ fn lay_out([a, b, c]: [f64; 3]) -> [DVec2; 3] {
     let x = (a * a + c * c - b * b) / (2.0 * a);
     [DVec2::ZERO, DVec2::new(a, 0.0), DVec2::new(x, 2.0 * area / a)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{square, torus};
+
+    #[test]
+    fn angle_defects_sum_to_the_euler_characteristic() {
+        for (mesh, euler) in [(torus(12, 8), 0.0), (square(4), 1.0)] {
+            let metric = Metric::new(&mesh);
+            let total: f64 = mesh.vertices().map(|v| metric.curvature(&mesh, v)).sum();
+            assert!((total - 2.0 * PI * euler).abs() < 1e-9, "{total}");
+        }
+    }
+
+    #[test]
+    fn transport_to_the_next_triangle_and_back_is_the_identity() {
+        let mesh = torus(12, 8);
+        let metric = Metric::new(&mesh);
+        for h in mesh.halfedges() {
+            let t = mesh.twin(h).unwrap();
+            let turns = (metric.transport(h, t) + metric.transport(t, h)) / (2.0 * PI);
+            assert!((turns - turns.round()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn directions_are_those_of_tangents_in_space() {
+        let mesh = torus(12, 8);
+        let metric = Metric::new(&mesh);
+        for f in mesh.faces() {
+            let tangent = metric.tangent(&mesh, f, 0.7);
+            assert!((tangent.length() - 1.0).abs() < 1e-12);
+            assert!((metric.angle_of(&mesh, f, 3.0 * tangent).unwrap() - 0.7).abs() < 1e-12);
+            assert_eq!(metric.angle_of(&mesh, f, mesh.face_normal(f)), None);
+        }
+    }
+
+    #[test]
+    fn a_degenerate_triangle_has_an_area_and_finite_angles() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::X * 2.0, DVec3::Y];
+        let mesh = TriMesh::from_faces(corners.to_vec(), &[[0, 1, 2], [0, 2, 3]]).unwrap();
+        let metric = Metric::new(&mesh);
+        assert!(metric.area(FaceId(0)) > 0.0);
+        let angles = mesh.face_halfedges(FaceId(0)).map(|h| metric.corner_angle(h));
+        assert!(angles.iter().all(|a| *a > 0.0) && (angles.iter().sum::<f64>() - PI).abs() < 1e-9, "{angles:?}");
+    }
+}

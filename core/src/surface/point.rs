@@ -33,3 +33,22 @@ impl SurfacePoint {
         corners[best]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::square;
+
+    #[test]
+    fn a_point_is_nearest_to_the_corner_of_largest_weight() {
+        let mesh = square(2);
+        let face = FaceId(1);
+        let [a, b, c] = mesh.face_vertices(face);
+        let at = |weights| SurfacePoint { face, weights };
+        assert_eq!(at([0.2, 0.5, 0.3]).nearest_vertex(&mesh), b);
+        assert_eq!(at([0.1, 0.2, 0.7]).nearest_vertex(&mesh), c);
+        // Of equal ones the first.
+        assert_eq!(at([0.4, 0.2, 0.4]).nearest_vertex(&mesh), a);
+        assert_eq!(at([0.0, 1.0, 0.0]).position(&mesh), mesh.position(b));
+    }
+}

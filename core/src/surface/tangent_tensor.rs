@@ -26,3 +26,18 @@ pub(super) fn plane_eigen(tensor: DMat3, n: DVec3) -> PlaneEigen {
     let angle = 0.5 * b.atan2(difference);
     PlaneEigen { low: mean - root, high: mean + root, axis: x * angle.cos() + y * angle.sin() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvalues_in_a_plane_leave_out_the_normal() {
+        let n = DVec3::new(1.0, 2.0, -2.0) / 3.0;
+        let (x, y) = n.any_orthonormal_pair();
+        let tensor = outer(x) * 3.0 - outer(y) + outer(n) * 7.0;
+        let eigen = plane_eigen(tensor, n);
+        assert!((eigen.low + 1.0).abs() < 1e-12 && (eigen.high - 3.0).abs() < 1e-12);
+        assert!((eigen.axis.dot(x).abs() - 1.0).abs() < 1e-12);
+    }
+}

@@ -54,3 +54,36 @@ pub(super) fn spokes_from_boundary(mesh: &TriMesh, entered: HalfedgeId, side: Si
 fn turn(mesh: &TriMesh, h: HalfedgeId, side: Side) -> HalfedgeId {
     if side == Side::Left { mesh.next(h) } else { mesh.prev(h) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::VertexId;
+    use crate::testing::square;
+
+    #[test]
+    fn spokes_of_both_sides_are_all_spokes_of_an_inner_vertex() {
+        let mesh = square(4);
+        let centre = VertexId(12);
+        let first = mesh.outgoing(centre).next().unwrap();
+        let to = mesh.face(mesh.outgoing(centre).nth(3).unwrap());
+        // `first` starts at the vertex, so that it is on the right.
+        let there = spokes_across(&mesh, first, to, Side::Right).unwrap();
+        let edges = |spokes: &[HalfedgeId]| spokes.iter().map(|&h| mesh.edge(h)).collect::<Vec<_>>();
+        let at_centre = |h: &HalfedgeId| mesh.edge_vertices(mesh.edge(*h)).contains(&centre);
+        assert!(there.iter().all(at_centre) && !edges(&there).contains(&mesh.edge(first)));
+        assert!(there.len() < mesh.outgoing(centre).count());
+    }
+
+    #[test]
+    fn a_fan_at_the_boundary_ends_there() {
+        let mesh = square(4);
+        let side = VertexId(2);
+        let first = mesh.outgoing(side).find(|&h| mesh.twin(h).is_some()).unwrap();
+        let spokes = spokes_to_boundary(&mesh, first, Side::Right);
+        assert_eq!(mesh.twin(*spokes.last().unwrap()), None);
+        assert!(spokes[..spokes.len() - 1].iter().all(|&h| mesh.twin(h).is_some()));
+        // No triangle is reached beyond the boundary.
+        assert_eq!(spokes_across(&mesh, first, FaceId(mesh.n_faces() as u32 - 1), Side::Right), None);
+    }
+}

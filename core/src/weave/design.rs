@@ -161,3 +161,60 @@ impl Design {
         if fits { Ok(()) } else { Err(DesignError::OtherMesh { mesh: self.mesh.to_string() }) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{row, torus};
+
+    fn strip(curve: SurfaceCurve) -> Strip {
+        let energy = Some(ElasticEnergy { found: 2.0, relaxed: 1.5 });
+        Strip { id: StripId(3), curve, on_proxy: None, cost: 2.5, energy, visible: false }
+    }
+
+    fn design() -> (TriMesh, Design) {
+        let mesh = torus(8, 6);
+        let mut design = Design::new(MeshSource::Builtin("torus".to_owned()), &mesh, Options::default());
+        design.strips.push(strip(row(8, 2, true, 0.25)));
+        design.pins.push(Pin::Node([0.0, 1.0, 2.0]));
+        (mesh, design)
+    }
+
+    #[test]
+    fn a_design_is_read_as_it_was_written() {
+        let (_, design) = design();
+        let text = serde_json::to_string(&design).unwrap();
+        assert_eq!(serde_json::from_str::<Design>(&text).unwrap(), design);
+        // Designs of before name the relaxed energy so.
+        assert!(text.contains(r#""energy":{"found":2.0,"now":1.5}"#), "{text}");
+    }
+
+    #[test]
+    fn a_design_fits_its_own_mesh_only() {
+        let (mesh, mut design) = design();
+        assert!(design.check_mesh(&mesh).is_ok());
+        assert!(matches!(design.check_mesh(&torus(8, 7)), Err(DesignError::OtherMesh { .. })));
+        // The fingerprint alone does not do: the curves must lie on the mesh.
+        design.strips[0].curve.crossings.truncate(1);
+        assert!(design.check_mesh(&mesh).is_err());
+    }
+
+    #[test]
+    fn a_design_of_a_later_program_is_refused() {
+        let (_, mut design) = design();
+        design.version = VERSION + 1;
+        let path = std::env::temp_dir().join(format!("plait-design-{}.plait", std::process::id()));
+        design.write(&path).unwrap();
+        let read = Design::read(&path);
+        std::fs::remove_file(&path).unwrap();
+        assert!(matches!(read, Err(DesignError::Version(2))), "{read:?}");
+    }
+
+    #[test]
+    fn a_strip_is_woven_on_the_proxy_if_it_has_a_curve_there() {
+        let mut strip = strip(row(8, 2, true, 0.25));
+        assert_eq!(strip.woven(), &strip.curve);
+        strip.on_proxy = Some(row(8, 3, true, 0.25));
+        assert_eq!(strip.woven(), &row(8, 3, true, 0.25));
+    }
+}

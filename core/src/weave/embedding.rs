@@ -28,25 +28,25 @@ pub struct InitialLayout {
 
 /// Which nodes and arcs are pinned.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct PinnedParts {
+pub struct PinnedElements {
     /// For each node.
     pub nodes: Vec<bool>,
     /// For each arc.
     pub arcs: Vec<bool>,
 }
 
-impl PinnedParts {
+impl PinnedElements {
     /// Pins further nodes and arcs.
     ///
     /// # Errors
     ///
-    /// [`WeaveError::NoPart`] if there is no such node or arc.
+    /// [`WeaveError::NoElement`] if there is no such node or arc.
     pub fn pin(&mut self, nodes: &[usize], arcs: &[usize]) -> Result<(), WeaveError> {
         for &i in nodes {
-            *self.nodes.get_mut(i).ok_or(WeaveError::NoPart(LayoutElement::Node(i as u32)))? = true;
+            *self.nodes.get_mut(i).ok_or(WeaveError::NoElement(LayoutElement::Node(i as u32)))? = true;
         }
         for &i in arcs {
-            *self.arcs.get_mut(i).ok_or(WeaveError::NoPart(LayoutElement::Arc(i as u32)))? = true;
+            *self.arcs.get_mut(i).ok_or(WeaveError::NoElement(LayoutElement::Arc(i as u32)))? = true;
         }
         Ok(())
     }
@@ -222,14 +222,14 @@ impl InitialLayout {
     }
 
     /// The nodes and arcs of `pins`: the part nearest to each.
-    pub fn pinned(&self, pins: &[Pin]) -> PinnedParts {
+    pub fn pinned(&self, pins: &[Pin]) -> PinnedElements {
         let place = |pin: Option<Pin>| match pin {
             Some(Pin::Node(p) | Pin::Arc(p)) => DVec3::from_array(p),
             None => DVec3::INFINITY,
         };
         let nodes: Vec<DVec3> = (0..self.layout.nodes.len()).map(|i| place(self.node_pin(i))).collect();
         let arcs: Vec<DVec3> = (0..self.layout.arcs.len()).map(|i| place(self.arc_pin(i))).collect();
-        let mut parts = PinnedParts { nodes: vec![false; nodes.len()], arcs: vec![false; arcs.len()] };
+        let mut parts = PinnedElements { nodes: vec![false; nodes.len()], arcs: vec![false; arcs.len()] };
         for pin in pins {
             let (places, pinned) = match pin {
                 Pin::Node(_) => (&nodes, &mut parts.nodes),
@@ -244,7 +244,7 @@ impl InitialLayout {
     }
 
     /// The pins of these parts.
-    pub fn pins(&self, parts: &PinnedParts) -> Vec<Pin> {
+    pub fn pins(&self, parts: &PinnedElements) -> Vec<Pin> {
         let set = |list: &[bool]| (0..list.len()).filter(|&i| list[i]).collect::<Vec<_>>();
         let nodes = set(&parts.nodes).into_iter().filter_map(|i| self.node_pin(i));
         let arcs = set(&parts.arcs).into_iter().filter_map(|i| self.arc_pin(i));
@@ -264,7 +264,7 @@ impl InitialLayout {
 pub fn optimise(
     session: &Session,
     initial: &InitialLayout,
-    pinned: &PinnedParts,
+    pinned: &PinnedElements,
     progress: &Progress,
     watch: &mut dyn FnMut(&Snapshot) -> Next,
 ) -> Result<OptimisedEmbedding, EmbeddingError> {

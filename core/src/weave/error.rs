@@ -37,13 +37,13 @@ pub enum WeaveError {
     Design(#[from] DesignError),
     /// A strip on the proxy has no counterpart on the design mesh.
     #[error("the strip cannot be placed here: {0}")]
-    Carry(#[from] CurveTransferError),
+    Transfer(#[from] CurveTransferError),
     /// The strips have no valid layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// The layout has no initial embedding.
     #[error(transparent)]
-    Embed(#[from] InitialEmbeddingError),
+    InitialEmbedding(#[from] InitialEmbeddingError),
     /// The embedding could not be optimised.
     #[error(transparent)]
     Embedding(#[from] EmbeddingError),
@@ -55,13 +55,13 @@ pub enum WeaveError {
     LayoutFile(#[from] LayoutFileError),
     /// The partial embedding of a layout file does not fit its mesh.
     #[error(transparent)]
-    Draw(#[from] PartialEmbeddingError),
+    PartialEmbedding(#[from] PartialEmbeddingError),
     /// The layout lacks arcs. Only the optimised map completes it.
     #[error("the layout lacks arcs; optimising its embedding completes it")]
     Incomplete,
     /// There is no such node or arc.
     #[error("the layout has no {0}")]
-    NoPart(LayoutElement),
+    NoElement(LayoutElement),
     /// No strip can be suggested.
     #[error(transparent)]
     NoSuggestion(#[from] NoSuggestion),

@@ -110,3 +110,26 @@ fn least_rotation(cycle: Vec<SideLabel>) -> Vec<SideLabel> {
     let rotated = |k: usize| [&cycle[k..], &cycle[..k]].concat();
     (0..cycle.len()).map(rotated).min().unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{column, row, torus};
+
+    #[test]
+    fn borders_are_compared_by_their_cyclic_order() {
+        assert_eq!(least_rotation(vec![(1, 2), (0, 5), (0, 3)]), [(0, 3), (1, 2), (0, 5)]);
+        assert_eq!(least_rotation(Vec::new()), []);
+    }
+
+    #[test]
+    fn the_same_curves_on_another_mesh_have_the_same_regions_and_others_have_not() {
+        let on = |n: u32, m: u32, rows: &[u32]| {
+            let mut curves: Vec<_> = rows.iter().map(|&j| row(n, j, true, 0.4)).collect();
+            curves.push(column(n, m, 1, true, 0.6));
+            Arrangement::new(&torus(n, m), &curves).unwrap()
+        };
+        assert!(same_regions(&on(8, 6, &[1, 4]), &on(10, 9, &[2, 6])));
+        assert!(!same_regions(&on(8, 6, &[1, 4]), &on(8, 6, &[1])));
+    }
+}

@@ -24,7 +24,7 @@ mod tests;
 mod woven;
 
 pub use design::{Design, DesignError, ElasticEnergy, Pin, Strip, StripId};
-pub use embedding::{InitialLayout, PinnedParts, initial_layout, optimise};
+pub use embedding::{InitialLayout, PinnedElements, initial_layout, optimise};
 pub use error::{NoSuggestion, WeaveError};
 pub use export::input::{CollapseLength, EmbeddingInput, ExportOptions, QuadSize, Watch};
 pub use export::refine::embed_and_refine;

@@ -7,7 +7,7 @@ use crate::layout::LayoutFile;
 use crate::mesh::{LoadedMesh, MeshSource, Topology};
 use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
-use crate::weave::embedding::{InitialLayout, PinnedParts};
+use crate::weave::embedding::{InitialLayout, PinnedElements};
 use crate::weave::error::WeaveError;
 use crate::weave::export::files::make_folder;
 use crate::weave::export::input::{EmbeddingInput, ExportOptions, Watch};
@@ -29,7 +29,7 @@ pub struct OpenedLayout {
     sharp: Vec<bool>,
     initial: InitialLayout,
     arc_headings: Vec<ArcHeadings>,
-    pinned: PinnedParts,
+    pinned: PinnedElements,
 }
 
 impl OpenedLayout {
@@ -51,7 +51,7 @@ impl OpenedLayout {
         let initial_embedding = file.partial_embedding(&loaded.mesh)?;
         progress.check()?;
         let (layout, embedding) = initial_embedding.to_embedding()?;
-        let mut pinned = PinnedParts {
+        let mut pinned = PinnedElements {
             nodes: file.nodes.iter().map(|n| n.fixed).collect(),
             arcs: file.arcs.iter().map(|a| a.fixed).collect(),
         };
@@ -77,7 +77,7 @@ impl OpenedLayout {
     ///
     /// # Errors
     ///
-    /// [`WeaveError::NoPart`] if there is no such node or arc.
+    /// [`WeaveError::NoElement`] if there is no such node or arc.
     pub fn pin(&mut self, nodes: &[usize], arcs: &[usize]) -> Result<(), WeaveError> {
         self.pinned.pin(nodes, arcs)?;
         self.file.nodes.iter_mut().zip(&self.pinned.nodes).for_each(|(node, &pinned)| node.fixed = pinned);

@@ -46,3 +46,22 @@ impl Default for Options {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_left_out_have_their_defaults() {
+        let options: Options = serde_json::from_str(r#"{"curvature_radius": 0.05}"#).unwrap();
+        assert_eq!(options, Options { curvature_radius: 0.05, ..Options::default() });
+    }
+
+    #[test]
+    fn a_design_without_a_choice_of_proxy_or_smoothing_does_not_name_them() {
+        let text = serde_json::to_string(&Options::default()).unwrap();
+        assert!(!text.contains("proxy") && !text.contains("smoothing"), "{text}");
+        let text = serde_json::to_string(&Options { proxy: 0, smoothing: 0.01, ..Options::default() }).unwrap();
+        assert!(text.contains(r#""proxy":0"#) && text.contains(r#""smoothing":0.01"#), "{text}");
+    }
+}

@@ -51,7 +51,7 @@ impl Woven {
         let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
         progress.report("Excluding directions of strips", 0.95);
-        let mut spine_mask = DirectionMask::none();
+        let mut spine_mask = DirectionMask::all_open();
         for strip in strips {
             mask_spine(model, strip, &mut spine_mask);
         }
@@ -99,7 +99,7 @@ fn mask_spine(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
     for i in usize::from(!curve.closed)..n {
         let Some(face) = curve.face_before(mesh, i) else { continue };
         let direction = curve.point(mesh, i) - curve.point(mesh, (i + n - 1) % n);
-        model.graph.disable_near(mask, face, direction, EQUIVALENT);
+        model.graph.close_near(mask, face, direction, EQUIVALENT);
     }
 }
 
@@ -119,7 +119,7 @@ fn mask_isolines(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: 
     }
     for ((face, _), (_, direction)) in largest {
         if direction != DVec3::ZERO {
-            model.graph.disable_near(mask, FaceId(face), direction, EQUIVALENT);
+            model.graph.close_near(mask, FaceId(face), direction, EQUIVALENT);
         }
     }
 }

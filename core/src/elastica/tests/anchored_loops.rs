@@ -12,7 +12,7 @@ use crate::progress::Progress;
 #[test]
 fn loops_through_anchors_are_exact() {
     let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let mut work = SearchWorkspace::new();
     let directed = |v: u32, d: DVec3| Anchor { vertex: VertexId(v), direction: Some(d) };
     let free = |v: u32| Anchor { vertex: VertexId(v), direction: None };
@@ -46,7 +46,7 @@ fn loops_through_anchors_are_exact() {
 #[test]
 fn anchors_on_an_open_surface_can_be_passed_from_boundary_to_boundary() {
     let g = graph(tube(24, 40));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let mut work = SearchWorkspace::new();
     let anchors = [10, 20, 30].map(|i| Anchor { vertex: VertexId(i), direction: Some(DVec3::Z) });
     let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };

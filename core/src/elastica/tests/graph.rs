@@ -47,8 +47,8 @@ fn a_cancelled_build_returns_no_graph() {
 #[test]
 fn a_geodesic_is_closed_in_both_directions() {
     let g = graph(torus(16, 10));
-    let mut mask = DirectionMask::none();
-    g.disable_near(&mut mask, FaceId(3), DVec3::Z, 0.2);
+    let mut mask = DirectionMask::all_open();
+    g.close_near(&mut mask, FaceId(3), DVec3::Z, 0.2);
     assert!(mask.n_closed() > 0);
     let closed: Vec<u32> = (0..g.n_states() as u32).filter(|&e| !mask.is_open(e)).collect();
     assert_eq!(closed.len(), 2 * mask.n_closed());
@@ -58,12 +58,12 @@ fn a_geodesic_is_closed_in_both_directions() {
 #[test]
 fn the_nearest_open_direction_skips_closed_ones() {
     let g = graph(torus(16, 10));
-    let (v, open) = (VertexId(3), DirectionMask::none());
+    let (v, open) = (VertexId(3), DirectionMask::all_open());
     let a = g.outgoing(v).start + 5;
     assert_eq!(g.nearest_open(&open, v, g.departure(a)), Some(a));
     let mut mask = open.clone();
     for f in g.mesh().outgoing(v).map(|h| g.mesh().face(h)) {
-        g.disable_near(&mut mask, f, g.departure(a), 0.1);
+        g.close_near(&mut mask, f, g.departure(a), 0.1);
     }
     let other = g.nearest_open(&mask, v, g.departure(a)).unwrap();
     assert!(!mask.is_open(a) && mask.is_open(other));
@@ -73,9 +73,9 @@ fn the_nearest_open_direction_skips_closed_ones() {
 fn a_vertex_without_open_directions_has_no_loops() {
     let g = graph(torus(16, 10));
     let v = VertexId(3);
-    let mut mask = DirectionMask::none();
+    let mut mask = DirectionMask::all_open();
     for f in g.mesh().outgoing(v).map(|h| g.mesh().face(h)) {
-        g.disable_near(&mut mask, f, DVec3::X, FRAC_PI_2 + 1e-6);
+        g.close_near(&mut mask, f, DVec3::X, FRAC_PI_2 + 1e-6);
     }
     let mut work = SearchWorkspace::new();
     let found = g.proposals(&ProposalQuery::alternatives(v, &mask), &mut work, &Progress::new()).unwrap();
@@ -89,7 +89,7 @@ fn a_vertex_without_open_directions_has_no_loops() {
 #[test]
 fn the_largest_number_of_loops_is_kept() {
     let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let query = ProposalQuery { factor: 3.0, max: 3, ..ProposalQuery::alternatives(VertexId(40), &mask) };
     let some = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
     assert_eq!(some.loops.len(), 3);
@@ -101,7 +101,7 @@ fn the_largest_number_of_loops_is_kept() {
 #[test]
 fn a_workspace_serves_one_query_after_the_other() {
     let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let mut shared = SearchWorkspace::new();
     for v in [3, 50, 3] {
         let query = ProposalQuery::alternatives(VertexId(v), &mask);
@@ -114,7 +114,7 @@ fn a_workspace_serves_one_query_after_the_other() {
 #[test]
 fn the_terms_of_a_route_sum_to_its_cost() {
     let g = graph(torus(24, 12));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let found =
         g.proposals(&ProposalQuery::cheapest(VertexId(5), &mask), &mut SearchWorkspace::new(), &Progress::new());
     let l = &found.unwrap().loops[0];
@@ -130,7 +130,7 @@ fn the_terms_of_a_route_sum_to_its_cost() {
 #[test]
 fn an_initial_loop_at_a_vertex_of_the_loop_is_the_loop() {
     let g = graph(torus(24, 12));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let found =
         g.proposals(&ProposalQuery::cheapest(VertexId(5), &mask), &mut SearchWorkspace::new(), &Progress::new());
     let l = &found.unwrap().loops[0];

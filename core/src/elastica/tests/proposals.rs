@@ -16,7 +16,7 @@ use crate::progress::Progress;
 #[test]
 fn loops_are_shown_while_the_search_continues() {
     let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let mut work = SearchWorkspace::new();
     for v in sample(&g, 6) {
         let mut seen = Vec::new();
@@ -32,7 +32,7 @@ fn loops_are_shown_while_the_search_continues() {
 #[test]
 fn the_cheapest_loop_of_a_torus_is_a_meridian_circle() {
     let g = graph(torus(48, 24));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let found =
         g.proposals(&ProposalQuery::alternatives(VertexId(5), &mask), &mut SearchWorkspace::new(), &Progress::new());
     let found = found.unwrap();
@@ -48,7 +48,7 @@ fn the_cheapest_loop_of_a_torus_is_a_meridian_circle() {
 #[test]
 fn of_homologous_loops_in_one_direction_one_is_proposed() {
     let (round, long) = (graph(torus(48, 24)), graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5))));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let mut fewer = 0;
     // Marks at the six corners of an octahedron; a torus needs none.
     for (g, marks) in [(round, 0..0), (long, 0..6)] {
@@ -81,7 +81,7 @@ fn of_homologous_loops_in_one_direction_one_is_proposed() {
 #[test]
 fn open_curves_compete_with_loops() {
     let g = graph(tube(24, 40));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let v = VertexId(20);
     let query = ProposalQuery { factor: 20.0, max: 100, ..ProposalQuery::alternatives(v, &mask) };
     let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
@@ -111,7 +111,7 @@ fn every_proposal_is_a_valid_curve() {
     let progress = Progress::new();
     for mesh in names.iter().filter_map(|n| Some((n, research(n)?))) {
         let (name, g) = (mesh.0, graph(mesh.1));
-        let mask = DirectionMask::none();
+        let mask = DirectionMask::all_open();
         let mut work = SearchWorkspace::new();
         let (mut with, mut without) = (0, 0);
         for v in sample(&g, 40) {
@@ -130,7 +130,7 @@ fn every_proposal_is_a_valid_curve() {
 #[test]
 fn a_nearby_loop_bounds_the_search_without_changing_the_result() {
     let meshes = [Some(torus(24, 12)), research("rockerarm_1k.off"), research("bunny_1k.obj")];
-    let (mask, progress) = (DirectionMask::none(), Progress::new());
+    let (mask, progress) = (DirectionMask::all_open(), Progress::new());
     for g in meshes.into_iter().flatten().map(graph) {
         let (mut work, mut joined, mut all) = (SearchWorkspace::new(), 0, 0);
         let mut settled = [0, 0];
@@ -167,7 +167,7 @@ fn a_nearby_loop_bounds_the_search_without_changing_the_result() {
 #[test]
 fn a_spent_budget_is_reported() {
     let g = graph(torus(24, 12));
-    let mask = DirectionMask::none();
+    let mask = DirectionMask::all_open();
     let query = ProposalQuery { budget: 10, ..ProposalQuery::cheapest(VertexId(3), &mask) };
     let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
     assert!(!found.proved && found.settled == 10);
@@ -185,7 +185,7 @@ fn the_number_of_threads_changes_nothing() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let g = graph(torus(32, 16));
-            let mask = DirectionMask::none();
+            let mask = DirectionMask::all_open();
             let mut work = SearchWorkspace::new();
             let find = |v| {
                 let query = ProposalQuery { factor: 4.0, budget: 60_000, ..ProposalQuery::alternatives(v, &mask) };

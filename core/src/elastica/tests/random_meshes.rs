@@ -40,14 +40,14 @@ fn uneven_graph(n: u32, m: u32, closed: bool, heights: &[f64]) -> ElasticaGraph 
 
 /// Closes directions in some faces; each item selects a face and an angle.
 fn close_some(graph: &ElasticaGraph, closed: &[(usize, f64)]) -> DirectionMask {
-    let mut mask = DirectionMask::none();
+    let mut mask = DirectionMask::all_open();
     let mesh = graph.mesh();
     for &(face, angle) in closed {
         let f = FaceId::new(face % mesh.n_faces());
         let [h, ..] = mesh.face_halfedges(f);
         let (x, normal) = (mesh.vector(h).normalize(), mesh.face_normal(f));
         let direction = x * angle.cos() + normal.cross(x) * angle.sin();
-        graph.disable_near(&mut mask, f, direction, 0.4 * FRAC_PI_2);
+        graph.close_near(&mut mask, f, direction, 0.4 * FRAC_PI_2);
     }
     mask
 }

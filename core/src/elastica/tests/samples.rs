@@ -106,6 +106,6 @@ pub(super) fn close_along(graph: &ElasticaGraph, curve: &SurfaceCurve, mask: &mu
     let n = curve.crossings.len();
     for i in usize::from(!curve.closed)..n {
         let along = curve.point(graph.mesh(), i) - curve.point(graph.mesh(), (i + n - 1) % n);
-        graph.disable_near(mask, curve.face_before(graph.mesh(), i).unwrap(), along, 45f64.to_radians());
+        graph.close_near(mask, curve.face_before(graph.mesh(), i).unwrap(), along, 45f64.to_radians());
     }
 }

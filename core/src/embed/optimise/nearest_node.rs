@@ -20,3 +20,24 @@ pub(super) fn nearest_nodes(mesh: &TriMesh, nodes: &[VertexId]) -> Vec<u32> {
     }
     nearest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{square, torus};
+
+    #[test]
+    fn every_vertex_belongs_to_the_node_nearest_along_edges() {
+        // A strip of five vertices per row: nodes at both ends of the first row.
+        let mesh = square(4);
+        let cells = nearest_nodes(&mesh, &[VertexId(0), VertexId(4)]);
+        assert_eq!(cells[..5], [0, 0, 0, 1, 1]);
+    }
+
+    #[test]
+    fn without_nodes_no_vertex_has_one() {
+        let mesh = torus(6, 5);
+        assert!(nearest_nodes(&mesh, &[]).iter().all(|&c| c == u32::MAX));
+        assert!(nearest_nodes(&mesh, &[VertexId(7)]).iter().all(|&c| c == 0));
+    }
+}

@@ -269,7 +269,7 @@ impl<'a> Optimiser<'a> {
             }
         }
         mesh.dilate_vertices(&mut near, TURNING_RINGS - 1);
-        mesh.faces_at(&near)
+        mesh.faces_touching(&near)
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn optimise_on_mesh(
         // The injective phase from the initial embedding works on another mesh, cut along the arcs, and may succeed.
         Err(error) => {
             let mut phases = Phases::new(problem, observer);
-            let mut done = phases.from_initial_embedding(problem, Err(error), progress)?;
+            let mut done = phases.restart_from_initial_embedding(problem, Err(error), progress)?;
             phases.complete_report(&mut done.report);
             return Ok(done);
         }

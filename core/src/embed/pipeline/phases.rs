@@ -117,7 +117,7 @@ impl<'w> Phases<'w> {
                     (Err(_), Ok(done)) if has_no_flips(&done) => done,
                     (Err(error), found) => {
                         tracing::debug!(%error, "no injective map near that of least squares");
-                        self.from_initial_embedding(problem, found, progress)?
+                        self.restart_from_initial_embedding(problem, found, progress)?
                     }
                 }
             }
@@ -145,7 +145,7 @@ impl<'w> Phases<'w> {
     }
 
     /// The result of the injective phase from the initial embedding; if it fails, the earlier result `found`.
-    pub(super) fn from_initial_embedding(
+    pub(super) fn restart_from_initial_embedding(
         &mut self,
         problem: &Problem<'_>,
         found: Result<OptimisedEmbedding, EmbeddingError>,

@@ -138,7 +138,7 @@ fn edges_near_nodes(topology: &EmbeddingTopology) -> Vec<bool> {
         near[n.vertex.index()] = true;
     }
     mesh.dilate_vertices(&mut near, RINGS - 1);
-    let inside = mesh.faces_at(&near);
+    let inside = mesh.faces_touching(&near);
     let mut marks = vec![false; mesh.n_edges()];
     for f in mesh.faces().filter(|f| inside[f.index()]) {
         mesh.face_halfedges(f).iter().for_each(|&h| marks[mesh.edge(h).index()] = true);

@@ -149,9 +149,9 @@ proptest! {
         for v in mesh.vertices() {
             prop_assert_eq!(marked[v.index()], search.depth(v).is_some_and(|d| d as usize <= rings));
         }
-        let faces = mesh.faces_at(&marked);
+        let faces = mesh.faces_touching(&marked);
         mesh.dilate_vertices(&mut marked, 1);
-        prop_assert_eq!(mesh.corners_of(&faces), marked);
+        prop_assert_eq!(mesh.vertices_of_faces(&faces), marked);
     }
 }
 

@@ -78,3 +78,17 @@ pub(in crate::weave) fn write_file(
     })
     .map_err(|source| WeaveError::Write { path: path.to_owned(), source })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_named() {
+        let folder = std::env::temp_dir().join(format!("plait-no-such-folder-{}", std::process::id()));
+        let path = folder.join("layout.obj");
+        let error = write_file(&path, |_| Ok(())).unwrap_err();
+        assert!(matches!(&error, WeaveError::Write { path: named, .. } if *named == path), "{error}");
+        assert!(error.to_string().contains("layout.obj"));
+    }
+}

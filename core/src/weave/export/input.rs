@@ -3,7 +3,7 @@
 use crate::embed::{ArcHeadings, Next, Settings, Snapshot, Surface};
 use crate::mesh::{Normalisation, TriMesh};
 use crate::proxy::Proxy;
-use crate::weave::embedding::{InitialLayout, PinnedParts};
+use crate::weave::embedding::{InitialLayout, PinnedElements};
 
 /// The size of the quads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,7 +68,7 @@ pub struct EmbeddingInput<'a> {
     /// Headings of the arcs' sides in the charts of the regions between them.
     pub arc_headings: &'a [ArcHeadings],
     /// Nodes and arcs that keep their positions.
-    pub pinned: &'a PinnedParts,
+    pub pinned: &'a PinnedElements,
 }
 
 impl EmbeddingInput<'_> {

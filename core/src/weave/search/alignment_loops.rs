@@ -115,7 +115,7 @@ mod tests {
         let loaded = builtin("torus").unwrap();
         let model = Model::prepare(loaded, Options::default(), &Progress::new()).unwrap();
         let aligned = AlignmentGraph::new(&model, &Progress::new()).unwrap().unwrap();
-        let none = DirectionMask::none();
+        let none = DirectionMask::all_open();
         let (mut alignment, mut length) = (0.0, 0.0);
         for v in (0..model.mesh.n_vertices()).step_by(97).map(VertexId::new) {
             for (v, direction) in aligned.queries(v) {

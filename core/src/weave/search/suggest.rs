@@ -57,7 +57,7 @@ impl Session {
         let before = deficit(&woven.reports, goal);
         let urgent = urgent_regions(&woven.reports, goal);
         let Some(&first) = urgent.first() else { return Err(NoSuggestion::Done.into()) };
-        let open = DirectionMask::none();
+        let open = DirectionMask::all_open();
         // First the cheapest loops in the most urgent region; then loops in four directions, in three regions; then the
         // same without the mask of placed strips; at last curves by connectivity alone.
         let stages = [(Search::Cheapest, &woven.mask, 1), (Search::Around, &woven.mask, 3), (Search::Around, &open, 3)];

@@ -50,7 +50,7 @@ const SHORTLIST_TOLERANCE: f64 = 0.3;
 
 /// A strip of a layout under trial.
 #[derive(Debug, Clone)]
-pub(in crate::weave) struct Tried {
+pub(in crate::weave) struct TrialStrip {
     pub proposal: Proposal,
     /// The strip of the session, once it is placed there.
     pub placed: Option<Strip>,
@@ -59,7 +59,7 @@ pub(in crate::weave) struct Tried {
 /// A layout under trial.
 #[derive(Debug, Clone)]
 pub(in crate::weave) struct Layout {
-    pub strips: Vec<Tried>,
+    pub strips: Vec<TrialStrip>,
     /// The objective before its nodes move.
     initial_objective: f64,
     /// Its fit after [`STEPS`] steps of the nodes.
@@ -101,11 +101,11 @@ impl Trial {
     /// woven mesh.
     pub(in crate::weave) fn new(session: &Session, design: &Design, progress: &Progress) -> Result<Self, WeaveError> {
         let model = Arc::clone(session.model());
-        let tried = |(here, own): (&Strip, &Strip)| Tried {
+        let tried = |(here, own): (&Strip, &Strip)| TrialStrip {
             proposal: Proposal { curve: here.woven().clone(), cost: own.cost, energy: own.energy },
             placed: Some(own.clone()),
         };
-        let strips: Vec<Tried> = session.design().strips.iter().zip(&design.strips).map(tried).collect();
+        let strips: Vec<TrialStrip> = session.design().strips.iter().zip(&design.strips).map(tried).collect();
         let all: Vec<&SurfaceCurve> = strips.iter().map(|s| &s.proposal.curve).collect();
         let initial_objective = fit(&model, &all, 0, progress)?.0.objective;
         let (fit, shares) = fit(&model, &all, STEPS, progress)?;
@@ -144,7 +144,7 @@ impl Trial {
         if let Some(out) = change.out {
             self.now.strips.remove(out);
         }
-        let added = change.add.iter().map(|&c| Tried { proposal: candidates[c].clone(), placed: None });
+        let added = change.add.iter().map(|&c| TrialStrip { proposal: candidates[c].clone(), placed: None });
         self.now.strips.extend(added);
         (self.now.initial_objective, self.now.fit, self.now.shares) = (initial_objective, fit, shares);
         Ok(true)
@@ -191,7 +191,7 @@ impl Trial {
         let v = self.point();
         let other = self.point_near(v);
         let model = &*self.model;
-        let none = DirectionMask::none();
+        let none = DirectionMask::all_open();
         let plain: Vec<Query> = std::iter::once((v, None)).chain(around(model, v)).collect();
         let mut found = loops(&model.graph, &plain, &none, POOL, progress)?;
         let mut chosen = Vec::new();

@@ -328,14 +328,15 @@ proptest! {
     fn random_great_circles_on_a_sphere_have_consistent_structure(
         normals in prop::collection::vec((0.0..std::f64::consts::TAU, -0.95..0.95f64), 2..6),
     ) {
-        let mesh = crate::field::samples::octasphere(6);
+        let mesh = crate::field::samples::octasphere(16);
         let normal = |&(angle, z): &(f64, f64)| {
             let r = (1.0 - z * z).sqrt();
             DVec3::new(r * angle.cos(), r * angle.sin(), z)
         };
         let normals: Vec<DVec3> = normals.iter().map(normal).collect();
-        // Nearly equal planes or planes through vertices are no arrangement in general position.
-        let apart = |a: &DVec3, b: &DVec3| a.cross(*b).length() > 0.1;
+        // Planes through vertices are not in general position. Circles that are less than a few edges apart may cross the same
+        // edges; their crossings can then be avoided.
+        let apart = |a: &DVec3, b: &DVec3| a.cross(*b).length() > 0.4;
         prop_assume!((0..normals.len()).all(|i| normals[..i].iter().all(|n| apart(n, &normals[i]))));
         prop_assume!(normals.iter().all(|n| mesh.positions().iter().all(|p| n.dot(*p).abs() > 1e-6)));
         let curves: Vec<SurfaceCurve> = normals.iter().map(|&n| plane_section(&mesh, n)).collect();

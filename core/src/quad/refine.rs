@@ -196,7 +196,7 @@ mod tests {
 
         #[test]
         fn resampling_gives_a_manifold_of_the_requested_size_and_refinement_halves_the_error(
-            m in 3u32..10, n in 3u32..10,
+            m in 6u32..14, n in 6u32..14,
         ) {
             let quads = resampled([m, n]);
             prop_assert_eq!(quads.quads.len() as u32, m * n);
@@ -208,8 +208,7 @@ mod tests {
                 let nearest: DVec3 = corners.iter().zip(weights).map(|(&c, w)| c * w).sum();
                 prop_assert!(nearest.distance(*p) < 1e-9);
             }
-            // The error is quadratic in the edge length: with half of it a quarter, at most half where quads are
-            // coarse.
+            // The error is quadratic in the edge length: with half of it a quarter in the limit, at most half here.
             let (coarse, fine) = (resampling_error(&quads, &TORUS), resampling_error(&resampled([2 * m, 2 * n]), &TORUS));
             prop_assert!(fine < 0.5 * coarse, "{} {}", coarse, fine);
         }

@@ -60,7 +60,7 @@ pub fn principal_curvature(mesh: &TriMesh, radius: f64, sharp: &[bool]) -> Vec<P
                 .map(|i| {
                     let v = VertexId::new(i);
                     let radius = radius.max(LEAST_RADIUS_IN_EDGES * mean_edge(mesh, v));
-                    principal(patches.mean_tensor(mesh, v, radius, &mut visited), vertex_normal(mesh, v))
+                    of_normal_cycles(patches.mean_tensor(mesh, v, radius, &mut visited), vertex_normal(mesh, v))
                 })
                 .collect()
         })
@@ -220,7 +220,7 @@ fn adjacency(mesh: &TriMesh, patch_of: &[u32], n: usize) -> (Vec<u32>, Vec<u32>)
 }
 
 /// Principal curvatures of a normal-cycle tensor in the plane with unit normal `n`.
-fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
+fn of_normal_cycles(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
     let eigen = plane_eigen(tensor, n);
     // The eigenvector of the larger eigenvalue is the direction of the smaller curvature: see the head of the file.
     PrincipalCurvature { k_min: eigen.low, k_max: eigen.high, d_min: eigen.axis, d_max: n.cross(eigen.axis) }

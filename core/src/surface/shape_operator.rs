@@ -24,7 +24,7 @@ pub fn face_curvature(
         let corners = mesh.face_vertices(f).into_iter().filter(|&v| counts(v));
         let (sum, n) =
             corners.fold((DMat3::ZERO, 0.0), |(sum, n), v| (sum + rotated(&curvature[v.index()], normal), n + 1.0));
-        principal(if n > 0.0 { sum * (1.0 / n) } else { sum }, normal)
+        of_shape_operator(if n > 0.0 { sum * (1.0 / n) } else { sum }, normal)
     };
     mesh.faces().map(average).collect()
 }
@@ -45,7 +45,7 @@ fn rotated(c: &PrincipalCurvature, normal: DVec3) -> DMat3 {
 }
 
 /// Principal curvatures of a shape operator in the plane with normal `n`; in an arbitrary plane if `n` is zero.
-fn principal(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
+fn of_shape_operator(tensor: DMat3, n: DVec3) -> PrincipalCurvature {
     let n = if n == DVec3::ZERO { DVec3::Z } else { n };
     let eigen = plane_eigen(tensor, n);
     PrincipalCurvature { k_min: eigen.low, k_max: eigen.high, d_min: n.cross(eigen.axis), d_max: eigen.axis }

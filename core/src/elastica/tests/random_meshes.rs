@@ -98,28 +98,146 @@ proptest! {
         closed in closed_directions(),
         anchors in prop::collection::vec((0usize..100, prop::option::of(prop::array::uniform3(-1.0f64..1.0))), 1..4),
     ) {
-        let g = uneven_graph(n, m, true, &heights);
-        let mask = close_some(&g, &closed);
-        let vertex = |i: usize| VertexId::new(i % g.mesh().n_vertices());
-        let anchors: Vec<Anchor> = anchors
-            .iter()
-            .map(|&(i, d)| Anchor { vertex: vertex(i), direction: d.map(DVec3::from_array) })
-            .collect();
-        let departures: Vec<Vec<State>> = anchors
-            .iter()
-            .map(|a| match a.direction {
-                Some(d) => g.nearest_open(&mask, a.vertex, d).into_iter().collect(),
-                None => g.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
-            })
-            .collect();
-        let reachable = departures.iter().all(|d| !d.is_empty());
-        let expected = if reachable { cheapest_round(&g, &mask, &departures) } else { f32::INFINITY };
-        let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
-        let progress = Progress::new();
-        let mut budget = SearchBudget { progress: &progress, limit: u64::MAX, settled: 0 };
-        let (route, proved) = g.route_through(&query, &mut SearchWorkspace::new(), &mut budget).unwrap();
-        let cost = route.as_ref().map_or(f32::INFINITY, |r| r.cost);
-        prop_assert!(proved);
+        let (cost, expected) = anchored_costs([n, m], &heights, &closed, &anchors);
         prop_assert!(same_cost(cost, expected), "{anchors:?}: {cost}, expected {expected}");
     }
+}
+
+/// An anchor: the number of its vertex, and a direction.
+type Choice = (usize, Option<[f64; 3]>);
+
+/// The cost of the loop found through anchors on an uneven torus, and that of the cheapest by plain Dijkstra.
+fn anchored_costs([n, m]: [u32; 2], heights: &[f64], closed: &[(usize, f64)], anchors: &[Choice]) -> (f32, f32) {
+    let g = uneven_graph(n, m, true, heights);
+    let mask = close_some(&g, closed);
+    let vertex = |i: usize| VertexId::new(i % g.mesh().n_vertices());
+    let anchors: Vec<Anchor> =
+        anchors.iter().map(|&(i, d)| Anchor { vertex: vertex(i), direction: d.map(DVec3::from_array) }).collect();
+    let departures: Vec<Vec<State>> = anchors
+        .iter()
+        .map(|a| match a.direction {
+            Some(d) => g.nearest_open(&mask, a.vertex, d).into_iter().collect(),
+            None => g.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
+        })
+        .collect();
+    let reachable = departures.iter().all(|d| !d.is_empty());
+    let expected = if reachable { cheapest_round(&g, &mask, &departures) } else { f32::INFINITY };
+    let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
+    let progress = Progress::new();
+    let mut budget = SearchBudget { progress: &progress, limit: u64::MAX, settled: 0 };
+    let (route, proved) = g.route_through(&query, &mut SearchWorkspace::new(), &mut budget).unwrap();
+    let cost = route.as_ref().map_or(f32::INFINITY, |r| r.cost);
+    assert!(proved);
+    (cost, expected)
+}
+
+/// The search through anchors misses the cheapest loop here. The cause is not found yet.
+#[test]
+#[ignore = "known fault: the loop found costs 0.7 % more than the cheapest"]
+fn a_loop_through_two_free_anchors_and_a_directed_one_is_exact() {
+    let heights = [
+        0.0,
+        0.36602968796151963,
+        0.9104412395001829,
+        0.40805689287032143,
+        0.601959705268989,
+        0.5556893883926397,
+        0.3416257748189453,
+        0.7568800295246814,
+        0.6758620499852441,
+        0.0,
+        0.273523680991185,
+        0.11658143677465142,
+        0.33047881936764056,
+        0.8734033470805872,
+        0.3393834145236624,
+        0.8407777834443462,
+        0.0,
+        0.8979251527455674,
+        0.7141664027113654,
+        0.5272130515444076,
+        0.0,
+        0.0,
+        0.8602430181701578,
+        0.0,
+        0.8662816182620104,
+        0.0,
+        0.0,
+        0.0,
+        0.704076252108906,
+        0.0,
+        0.467625878049459,
+        0.6084580343246772,
+        0.34911961147290244,
+        0.167665153051294,
+        0.0,
+        0.6786333516345799,
+        0.7874262465093248,
+        0.3485031384985415,
+        0.4622845702711125,
+        0.23066639400387529,
+        0.6231267963313863,
+        0.5268025906522001,
+        0.5331821946489721,
+        0.15311317973628666,
+        0.866620715499806,
+        0.5873209914387564,
+        0.5334511780456579,
+        0.44017863142384517,
+        0.6578653834299102,
+        0.4885339069484,
+        0.19480021830992325,
+        0.8316846187662573,
+        0.20774541706077373,
+        0.0781505514091397,
+        0.6579790220073596,
+        0.3260496329676427,
+        0.5086797165723969,
+        0.17538646839442554,
+        0.4514996078500695,
+        0.2969776271796953,
+        0.6463108023961528,
+        0.729514876996506,
+        0.9412891196405639,
+        0.22627059920309311,
+        0.2744996199637945,
+        0.23099970985640444,
+        0.34276305793397227,
+        0.9171231240681811,
+        0.22599279586967752,
+        0.8459174279880649,
+        0.9495459166497928,
+        0.3488888670714754,
+        0.7863342355892581,
+        0.1661394503663628,
+        0.5990791785585664,
+        0.0455948006062414,
+        0.5920623522905131,
+        0.5037460050265259,
+        0.5068085648418695,
+        0.17865784523701947,
+        0.3732783738912033,
+        0.6558521294165056,
+        0.28856984902557753,
+        0.03392499243374742,
+        0.9626794632944891,
+        0.8746608014615997,
+        0.5944897095493966,
+        0.33194855888650326,
+        0.6034370138809126,
+        0.9346113454435487,
+    ];
+    let closed: Vec<(usize, f64)> = vec![
+        (134, 3.857505405779581),
+        (166, 4.094309725154457),
+        (161, 0.33811478706340264),
+        (170, 5.011703811234001),
+        (125, 2.3745491719423004),
+        (151, 1.5072846166329676),
+        (87, 3.081130155571154),
+    ];
+    let anchors: Vec<Choice> =
+        vec![(13, None), (18, None), (87, Some([-0.2642165358079778, 0.32442493696965147, 0.0012890924057124995]))];
+    let (cost, expected) = anchored_costs([7, 7], &heights, &closed, &anchors);
+    assert!(same_cost(cost, expected), "{cost}, expected {expected}");
 }

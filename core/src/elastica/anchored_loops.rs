@@ -14,9 +14,6 @@
 //! The start is the anchor with the fewest directions. If all anchors have a direction, step 1 gives the exact cost.
 //!
 //! The thesis runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
-//!
-//! Known fault: on one random torus of 49 vertices, with two free anchors and one directed, the loop found cost 0.7 % more
-//! than the cheapest. The cause is not found yet.
 
 use glam::DVec3;
 

@@ -92,11 +92,12 @@ impl BucketQueue {
         Some((f32::from_bits((entry >> 32) as u32), entry as State))
     }
 
-    /// The smallest key, infinite if the queue is empty.
+    /// The entry with the smallest key.
     #[inline]
-    pub(super) fn min_key(&mut self) -> f32 {
+    pub(super) fn peek(&mut self) -> Option<(f32, State)> {
         self.advance();
-        self.near.peek().map_or(f32::INFINITY, |Reverse(entry)| f32::from_bits((entry >> 32) as u32))
+        let Reverse(entry) = self.near.peek()?;
+        Some((f32::from_bits((entry >> 32) as u32), *entry as State))
     }
 }
 
@@ -120,7 +121,8 @@ mod tests {
                 let (key, e) = (random(1000) as f32 * scale, random(50) as State);
                 queue.push(key, e);
                 heap.push(Reverse((key.to_bits(), e)));
-                assert_eq!(queue.min_key().to_bits(), heap.peek().unwrap().0.0);
+                let Reverse((least, first)) = *heap.peek().unwrap();
+                assert_eq!(queue.peek(), Some((f32::from_bits(least), first)));
                 if random(3) == 0 {
                     let Reverse((key, e)) = heap.pop().unwrap();
                     assert_eq!(queue.pop(), Some((f32::from_bits(key), e)));
@@ -129,7 +131,7 @@ mod tests {
             while let Some(Reverse((key, e))) = heap.pop() {
                 assert_eq!(queue.pop(), Some((f32::from_bits(key), e)));
             }
-            assert_eq!((queue.pop(), queue.min_key()), (None, f32::INFINITY));
+            assert_eq!((queue.pop(), queue.peek()), (None, None));
         }
     }
 

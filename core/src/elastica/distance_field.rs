@@ -142,10 +142,19 @@ impl DistanceField {
         Ok(())
     }
 
-    /// Smallest key in the queue; infinite if it is empty.
+    /// The key of the state that is settled next; infinite if there is none.
+    ///
+    /// A state that was reached more than once has older entries in the queue. Those of settled states are removed here:
+    /// their keys are smaller than that of the next state, and a search over several fields would take the wrong one.
     #[inline]
     pub(super) fn min_key(&mut self) -> f32 {
-        self.queue.min_key()
+        loop {
+            match self.queue.peek() {
+                Some((_, e)) if self.is_settled(e) => self.queue.pop(),
+                Some((key, _)) => return key,
+                None => return f32::INFINITY,
+            };
+        }
     }
 
     /// Exchanges the queue with another one.
@@ -202,6 +211,19 @@ mod tests {
         field.restart(4);
         assert_eq!(field.distance(1), f32::INFINITY);
         assert!(field.improves(1, 1.0) && field.number > 2);
+    }
+
+    #[test]
+    fn the_smallest_key_is_not_that_of_a_settled_state() {
+        let mut field = field();
+        field.add_source(0, 3.0);
+        field.relax(0, 1.0, 3);
+        field.add_source(1, 4.0);
+        assert_eq!(field.min_key(), 1.0);
+        // As `settle` does, without a graph.
+        field.queue.pop();
+        field.labels[0] -= 1 << 32;
+        assert_eq!(field.min_key(), 4.0);
     }
 
     #[test]

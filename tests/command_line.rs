@@ -61,3 +61,42 @@ fn a_benchmark_is_written_as_json_table_and_picture() {
     let wrong = plait(&["bench", "table", &file("plot.svg")]);
     assert!(wrong.status.code() == Some(1) && errors(&wrong).contains("is not a benchmark report"));
 }
+
+#[test]
+fn an_export_keeps_files_of_others_and_the_mesh_it_is_made_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let weave =
+        |mesh: &str| plait(&["weave", mesh, "--suggest", "--no-optimise", "--quads", "100", "--out", &at("out")]);
+    // Its own files are replaced.
+    for _ in 0..2 {
+        let output = weave("torus");
+        assert!(output.status.success(), "{}", errors(&output));
+    }
+    let quads = at("out/quads.obj");
+    let written = std::fs::read_to_string(&quads).unwrap();
+    // A mesh of that name is not, and nothing else is written.
+    std::fs::write(&quads, "v 0 0 0\n").unwrap();
+    std::fs::remove_file(at("out/design.plait")).unwrap();
+    let output = weave("torus");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(errors(&output).contains("quads.obj is no mesh written by Plait"), "{}", errors(&output));
+    assert_eq!(std::fs::read_to_string(&quads).unwrap(), "v 0 0 0\n");
+    assert!(!std::fs::exists(at("out/design.plait")).unwrap());
+    // Nor is the mesh that the layout is made from.
+    std::fs::write(&quads, &written).unwrap();
+    let output = weave(&quads);
+    assert!(errors(&output).contains("is the mesh of this layout"), "{}", errors(&output));
+    assert_eq!(std::fs::read_to_string(&quads).unwrap(), written);
+}
+
+#[test]
+fn a_picture_replaces_pictures_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("torus.png");
+    std::fs::write(&path, "v 0 0 0\n").unwrap();
+    let output = plait(&["render", "torus", "--out", path.to_str().unwrap(), "--size", "64x64"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(errors(&output).contains("torus.png is no PNG picture"), "{}", errors(&output));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "v 0 0 0\n");
+}

@@ -1,5 +1,7 @@
 //! The whole window without a display: drawn by a software driver, driven through its widget tree and pointer.
 
+#[path = "window/files.rs"]
+mod files;
 #[path = "support/stand_in.rs"]
 mod stand_in;
 
@@ -28,6 +30,8 @@ fn open_with(opener: Arc<dyn Opener>, model: &str) -> Window {
     let mut window = Harness::builder()
         .with_size(vec2(1100.0, 700.0))
         .with_max_steps(8)
+        // A quarter of a second, the default, is too long for a double click.
+        .with_step_dt(1.0 / 60.0)
         .wgpu()
         .build_eframe(move |cc| PlaitApp::new(cc, opener, Some(source)).unwrap());
     wait(&mut window, |app| app.scene().is_some());

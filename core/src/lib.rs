@@ -11,6 +11,7 @@ pub mod embed;
 pub mod field;
 pub mod layout;
 pub mod mesh;
+pub mod output;
 pub mod param;
 pub mod progress;
 pub mod proxy;

@@ -1,7 +1,9 @@
 //! Rendering without a window or a display, to a texture that is read back.
 
+use std::io::Write as _;
 use std::path::Path;
 
+use plait_core::output::{self, FileKind, OutputError};
 use thiserror::Error;
 
 use super::renderer::{Frame, Renderer};
@@ -15,9 +17,12 @@ pub enum HeadlessError {
     /// The driver failed.
     #[error("the graphics driver failed: {0}")]
     Device(String),
+    /// The picture could not be encoded.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(#[from] image::ImageError),
     /// The file could not be written.
-    #[error("cannot write the image: {0}")]
-    Write(#[from] image::ImageError),
+    #[error(transparent)]
+    Write(#[from] OutputError),
 }
 
 /// A graphics device without a display, and a renderer on it.
@@ -127,8 +132,9 @@ impl Headless {
 /// When no driver works or the file cannot be written.
 pub fn render_to_png(frame: &Frame, path: &Path) -> Result<(), HeadlessError> {
     let picture = Headless::new()?.render(frame)?;
-    picture.save_with_format(path, image::ImageFormat::Png)?;
-    Ok(())
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut png, image::ImageFormat::Png)?;
+    Ok(output::write(path, FileKind::Png, |out| out.write_all(png.get_ref()))?)
 }
 
 #[cfg(test)]

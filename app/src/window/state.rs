@@ -87,6 +87,11 @@ impl PlaitApp {
         }
     }
 
+    /// Uses no dialogs of the system from now on, only those of the program.
+    pub fn use_own_dialogs(&mut self) {
+        self.dialogs.only_own = true;
+    }
+
     /// The scene shown; `None` until the first model is open.
     pub fn scene(&self) -> Option<&Scene> {
         self.scene.as_deref()

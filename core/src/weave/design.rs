@@ -1,11 +1,13 @@
 //! The design, the document of the program: mesh, options, strips in order, pins.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::mesh::{MeshSource, TriMesh, fingerprint};
+use crate::output::{self, FileKind, OutputError};
 use crate::surface::SurfaceCurve;
 use crate::weave::options::Options;
 
@@ -65,7 +67,7 @@ pub enum Pin {
 /// Why a design could not be read or written.
 #[derive(Debug, Error)]
 pub enum DesignError {
-    /// The file could not be read or written.
+    /// The file could not be read.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -73,6 +75,9 @@ pub enum DesignError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] OutputError),
     /// The file is not a design.
     #[error("{path} is not a Plait design: {source}")]
     Format {
@@ -139,16 +144,15 @@ impl Design {
         Ok(design)
     }
 
-    /// Writes the design.
+    /// Writes the design. It replaces an older design, but no other file.
     ///
     /// # Errors
     ///
-    /// [`DesignError::File`].
+    /// [`DesignError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), DesignError> {
-        let file = |source| DesignError::File { path: path.to_owned(), source };
         let text =
             serde_json::to_string(self).map_err(|source| DesignError::Format { path: path.to_owned(), source })?;
-        std::fs::write(path, text + "\n").map_err(file)
+        Ok(output::write(path, FileKind::Design, |out| writeln!(out, "{text}"))?)
     }
 
     /// Checks that `mesh` is the one that the design was made on and that all strips lie on it.

@@ -1,5 +1,7 @@
 //! Errors of weaving.
 
+use std::path::PathBuf;
+
 use thiserror::Error;
 
 use crate::dual::ArrangementError;
@@ -10,6 +12,7 @@ use crate::layout::{
     InitialEmbeddingError, LayoutElement, LayoutError, LayoutFileError, PartialEmbeddingError, PatchError,
 };
 use crate::mesh::LoadError;
+use crate::output::OutputError;
 use crate::progress::Cancelled;
 use crate::proxy::CurveTransferError;
 use crate::weave::design::{DesignError, StripId};
@@ -71,13 +74,22 @@ pub enum WeaveError {
     /// There is no such strip.
     #[error("there is no strip {}", .0.0)]
     NoStrip(StripId),
-    /// A file could not be written.
-    #[error("{path}: {source}")]
-    Write {
-        /// The file.
-        path: std::path::PathBuf,
+    /// A folder could not be made.
+    #[error("the folder {path} cannot be made: {source}")]
+    Folder {
+        /// The folder.
+        path: PathBuf,
         /// The error of the operating system.
         source: std::io::Error,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] OutputError),
+    /// The export would replace the mesh that it was made from.
+    #[error("{path} is the mesh of this layout, so it is not replaced; export to another folder")]
+    OwnMesh {
+        /// The mesh.
+        path: PathBuf,
     },
 }
 

@@ -26,6 +26,7 @@ mod woven;
 pub use design::{Design, DesignError, ElasticEnergy, Pin, Strip, StripId};
 pub use embedding::{InitialLayout, PinnedElements, initial_layout, optimise};
 pub use error::{NoSuggestion, WeaveError};
+pub use export::files::existing_files;
 pub use export::input::{CollapseLength, EmbeddingInput, ExportOptions, QuadSize, Watch};
 pub use export::refine::embed_and_refine;
 pub use export::result::{Export, InitialState, Times};

@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::surface::{PrincipalCurvature, SurfaceIndex, principal_curvature};
 use crate::weave::embedding::{InitialLayout, PinnedElements};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::make_folder;
+use crate::weave::export::files::prepare_folder;
 use crate::weave::export::input::{EmbeddingInput, ExportOptions, Watch};
 use crate::weave::export::refine::embed_and_refine;
 use crate::weave::export::report::{Subject, write_report};
@@ -99,7 +99,7 @@ impl OpenedLayout {
         progress: &Progress,
         watch: Watch<'_>,
     ) -> Result<Result<Export, WeaveError>, WeaveError> {
-        make_folder(folder)?;
+        prepare_folder(folder, &self.file.mesh)?;
         let mesh = &*self.loaded.mesh;
         let input = EmbeddingInput {
             surface: Surface { mesh, index: &self.index, curvature: &self.curvature, sharp: &self.sharp },

@@ -19,6 +19,7 @@ mod table;
 use std::io::Write as _;
 
 use anyhow::Context as _;
+use plait_core::output::{self, FileKind};
 use plait_core::progress::Progress;
 use plait_core::weave::{Options, Session};
 
@@ -52,7 +53,7 @@ pub fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
         BenchCommand::Table(table) => write(&table::markdown(&Report::read_all(&table.reports)?)),
         BenchCommand::Plot(plot) => {
             let picture = plot::svg(&Report::read_all(&plot.reports)?)?;
-            std::fs::write(&plot.out, picture).with_context(|| plot.out.display().to_string())
+            Ok(output::write(&plot.out, FileKind::Svg, |out| out.write_all(picture.as_bytes()))?)
         }
     }
 }

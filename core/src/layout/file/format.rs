@@ -1,11 +1,13 @@
 //! The contents of a layout file, reading and writing.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::mesh::{MeshSource, TriMesh, VertexId, fingerprint};
+use crate::output::{self, FileKind, OutputError};
 use crate::surface::{Crossing, SurfacePoint};
 
 /// Version of the file format that is written.
@@ -83,7 +85,7 @@ pub enum PathPoint {
 /// Why a layout file could not be read or written.
 #[derive(Debug, Error)]
 pub enum LayoutFileError {
-    /// The file could not be read or written.
+    /// The file could not be read.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -91,6 +93,9 @@ pub enum LayoutFileError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] OutputError),
     /// The file is not a layout file.
     #[error("{path} is not a Plait layout: {source}")]
     Format {
@@ -158,15 +163,15 @@ impl LayoutFile {
         serde_json::from_str(&text).map_err(format)
     }
 
-    /// Writes the layout file.
+    /// Writes the layout file. It replaces an older layout file, but no other file.
     ///
     /// # Errors
     ///
-    /// [`LayoutFileError::File`].
+    /// [`LayoutFileError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), LayoutFileError> {
         let text =
             serde_json::to_string(self).map_err(|source| LayoutFileError::Format { path: path.to_owned(), source })?;
-        std::fs::write(path, text + "\n").map_err(|source| LayoutFileError::File { path: path.to_owned(), source })
+        Ok(output::write(path, FileKind::Layout, |out| writeln!(out, "{text}"))?)
     }
 
     /// Checks that `mesh` has the fingerprint of the file, if there is one.

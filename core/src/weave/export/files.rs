@@ -1,11 +1,42 @@
-//! The mesh files of an export.
+//! The files of an export.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::mesh::{Normalisation, write_obj};
+use crate::mesh::{MeshSource, Normalisation, write_obj};
+use crate::output::{self, FileKind, MESH_COMMENT, OutputStream};
 use crate::weave::error::WeaveError;
 use crate::weave::export::result::Export;
+
+/// The files that an export may write to its folder, with their kinds.
+const EXPORTED: [(&str, FileKind); 6] = [
+    ("design.plait", FileKind::Design),
+    ("layout.layout", FileKind::Layout),
+    ("layout.obj", FileKind::Mesh),
+    ("quads.obj", FileKind::Mesh),
+    ("patches.obj", FileKind::Mesh),
+    ("report.json", FileKind::Report),
+];
+
+/// The files in `folder` that an export to it may replace.
+pub fn existing_files(folder: &Path) -> Vec<PathBuf> {
+    EXPORTED.iter().map(|(name, _)| folder.join(name)).filter(|path| path.exists()).collect()
+}
+
+/// Makes the folder of an export, and checks that the export replaces neither files that are not its own nor the mesh it is
+/// made from.
+pub(in crate::weave) fn prepare_folder(folder: &Path, mesh: &MeshSource) -> Result<(), WeaveError> {
+    std::fs::create_dir_all(folder).map_err(|source| WeaveError::Folder { path: folder.to_owned(), source })?;
+    let own = if let MeshSource::File(path) = mesh { path.canonicalize().ok() } else { None };
+    for (name, kind) in EXPORTED {
+        let path = folder.join(name);
+        output::check_replaceable(&path, kind)?;
+        if own.is_some() && path.canonicalize().ok() == own {
+            return Err(WeaveError::OwnMesh { path });
+        }
+    }
+    Ok(())
+}
 
 impl Export {
     /// Writes `layout.obj`, `quads.obj` and `patches.obj` to `folder`, in units of the file.
@@ -17,11 +48,14 @@ impl Export {
         let in_file = |ps: &[glam::DVec3]| ps.iter().map(|&p| units.to_file(p)).collect::<Vec<_>>();
         let nodes = &self.quads.positions[..self.quads.n_nodes];
         let corners: Vec<[u32; 4]> = self.layout.patches.iter().map(|p| p.corners).collect();
-        write_file(&folder.join("layout.obj"), |out| write_obj(out, &in_file(nodes), &corners))?;
-        write_file(&folder.join("quads.obj"), |out| {
+        write_mesh(&folder.join("layout.obj"), "the patches of the layout, each as one polygon", |out| {
+            write_obj(out, &in_file(nodes), &corners)
+        })?;
+        write_mesh(&folder.join("quads.obj"), "the quad mesh of the layout", |out| {
             write_obj(out, &in_file(&self.quads.positions), &self.quads.quads)
         })?;
-        write_file(&folder.join("patches.obj"), |out| self.write_patches(out, units))
+        let about = "the triangle mesh, a group for each patch, with the map of the patch as texture coordinates";
+        write_mesh(&folder.join("patches.obj"), about, |out| self.write_patches(out, units))
     }
 
     /// The triangle mesh, with one group for each patch and the map of the patch as texture coordinates. Vertices of the
@@ -61,34 +95,53 @@ impl Export {
     }
 }
 
-/// Creates a folder and those above it.
-pub(in crate::weave) fn make_folder(folder: &Path) -> Result<(), WeaveError> {
-    std::fs::create_dir_all(folder).map_err(|source| WeaveError::Write { path: folder.to_owned(), source })
-}
-
-/// Writes a file with a buffer.
-pub(in crate::weave) fn write_file(
+/// Writes an OBJ file that begins with a comment, by which it is recognised when it is to be replaced.
+fn write_mesh(
     path: &Path,
-    write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
+    about: &str,
+    fill: impl FnOnce(&mut OutputStream) -> std::io::Result<()>,
 ) -> Result<(), WeaveError> {
-    let open = std::fs::File::create(path).map(std::io::BufWriter::new);
-    open.and_then(|mut out| {
-        write(&mut out)?;
-        out.flush()
-    })
-    .map_err(|source| WeaveError::Write { path: path.to_owned(), source })
+    output::write(path, FileKind::Mesh, |out| {
+        writeln!(out, "{MESH_COMMENT}{about}")?;
+        fill(out)
+    })?;
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::OutputError;
 
     #[test]
-    fn a_file_that_cannot_be_written_is_named() {
-        let folder = std::env::temp_dir().join(format!("plait-no-such-folder-{}", std::process::id()));
-        let path = folder.join("layout.obj");
-        let error = write_file(&path, |_| Ok(())).unwrap_err();
-        assert!(matches!(&error, WeaveError::Write { path: named, .. } if *named == path), "{error}");
-        assert!(error.to_string().contains("layout.obj"));
+    fn files_that_no_export_wrote_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (folder, builtin) = (folder.path().join("a/b"), MeshSource::Builtin("torus".into()));
+        prepare_folder(&folder, &builtin).unwrap();
+        assert!(folder.is_dir() && existing_files(&folder).is_empty());
+        let path = folder.join("quads.obj");
+        std::fs::write(&path, "v 0 0 0\n").unwrap();
+        let error = prepare_folder(&folder, &builtin).unwrap_err();
+        assert!(matches!(&error, WeaveError::Write(OutputError::OtherKind { path: named, .. }) if *named == path));
+        assert_eq!(existing_files(&folder), [path]);
+    }
+
+    #[test]
+    fn the_mesh_of_the_layout_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("quads.obj");
+        write_mesh(&path, "test", |out| writeln!(out, "v 0 0 0")).unwrap();
+        prepare_folder(folder.path(), &MeshSource::File("other.obj".into())).unwrap();
+        let error = prepare_folder(folder.path(), &MeshSource::File(path.clone())).unwrap_err();
+        assert!(matches!(error, WeaveError::OwnMesh { path: named } if named == path));
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let error = prepare_folder(&file.join("out"), &MeshSource::Builtin("torus".into())).unwrap_err();
+        assert!(matches!(&error, WeaveError::Folder { .. }) && error.to_string().contains("file/out"), "{error}");
     }
 }

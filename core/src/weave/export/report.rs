@@ -10,10 +10,10 @@ use serde::Serialize;
 use crate::dual::{Colour, RegionReport};
 use crate::embed::{CollapsedChord, EmbeddingReport, Measures, PatchMeasures, UncollapsedChord, measure_patches};
 use crate::mesh::{LoadedMesh, Topology, TriMesh};
+use crate::output::{self, FileKind};
 use crate::quad::{quality, resampling_error};
 use crate::weave::design::Strip;
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::write_file;
 use crate::weave::export::result::{Export, Times};
 use crate::weave::mesh_role::MeshRole;
 use crate::weave::session::Session;
@@ -221,7 +221,8 @@ pub(in crate::weave) fn write_report(
         seconds,
     };
     let text = serde_json::to_string_pretty(&report).unwrap_or_default();
-    write_file(&folder.join("report.json"), |out| writeln!(out, "{text}"))
+    output::write(&folder.join("report.json"), FileKind::Report, |out| writeln!(out, "{text}"))?;
+    Ok(())
 }
 
 fn weaving(session: &Session, layout_on_proxy: bool) -> Weaving<'_> {

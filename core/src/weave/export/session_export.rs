@@ -7,7 +7,7 @@ use crate::layout::LayoutFile;
 use crate::progress::Progress;
 use crate::weave::embedding::{InitialLayout, initial_layout};
 use crate::weave::error::WeaveError;
-use crate::weave::export::files::make_folder;
+use crate::weave::export::files::prepare_folder;
 use crate::weave::export::input::{EmbeddingInput, ExportOptions, Watch};
 use crate::weave::export::refine::embed_and_refine;
 use crate::weave::export::report::{Subject, write_report};
@@ -72,7 +72,7 @@ pub fn write_all(
     progress: &Progress,
     watch: Watch<'_>,
 ) -> Result<Result<Export, WeaveError>, WeaveError> {
-    make_folder(folder)?;
+    prepare_folder(folder, &session.design().mesh)?;
     session.design().write(&folder.join("design.plait"))?;
     let result = export_session(session, optimised, options, progress, watch);
     progress.check()?;

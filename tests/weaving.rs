@@ -40,6 +40,32 @@ fn steps_are_undone_and_redone() {
 }
 
 #[test]
+fn a_script_sets_anchors_and_edits_a_strip() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = |steps: &str| {
+        let out = folder.path().join("out");
+        let output = plait(&["weave", text(&torus_script(folder.path(), steps)), "--no-optimise", "--out", text(&out)]);
+        (Design::read(&out.join("design.plait")), errors(&output))
+    };
+    let along = r#"{"anchor": {"at": [1.07, 0, 0], "direction": [0, 1, 0]}}, {"place": true}"#;
+    let across = r#"{"anchor": {"at": [1.07, 0, 0], "direction": [0, 0, 1]}}, {"place": true}"#;
+    let two = design(&format!("{along}, {across}")).0.unwrap();
+    assert!(two.strips.iter().all(|s| s.anchors.len() == 1) && two.strips[0].cost != two.strips[1].cost);
+    let edit = r#"{"edit": 0}, {"anchor": {"at": [-1.07, 0, 0]}}, {"place": true}"#;
+    let edited = design(&format!("{along}, {across}, {edit}")).0.unwrap();
+    assert_eq!(edited.strips.iter().map(|s| s.anchors.len()).collect::<Vec<_>>(), [2, 1]);
+    assert!(edited.strips[0].id == two.strips[0].id && edited.strips[1] == two.strips[1]);
+    for (steps, message) in [
+        (r#"{"anchor": {"at": [1, 0, 0], "direction": [0, 0, 0]}}"#, "the direction is not a finite vector"),
+        (r#"{"suggest": true}, {"edit": 0}"#, "the strip has no anchors"),
+        (r#"{"edit": 3}"#, "there is no such strip"),
+    ] {
+        let (_, errors) = design(steps);
+        assert!(errors.contains(message), "{steps}: {errors}");
+    }
+}
+
+#[test]
 fn a_script_continues_a_saved_design() {
     let folder = tempfile::tempdir().unwrap();
     let weave = |script: &Path, name: &str| {

@@ -1,5 +1,7 @@
 //! The whole window without a display: drawn by a software driver, driven through its widget tree and pointer.
 
+#[path = "window/anchors.rs"]
+mod anchors;
 #[path = "window/files.rs"]
 mod files;
 #[path = "support/stand_in.rs"]
@@ -174,13 +176,15 @@ fn exporting_too_early_says_why() {
 fn dragging_turns_the_view_and_places_nothing() {
     let mut window = open("torus");
     let before = *window.state().camera();
-    window.hover_at(FRONT);
+    // Beside the model.
+    let beside = pos2(60.0, 120.0);
+    window.hover_at(beside);
     window.step();
-    window.drag_at(FRONT);
+    window.drag_at(beside);
     window.step();
-    window.hover_at(FRONT + vec2(60.0, 10.0));
+    window.hover_at(beside + vec2(60.0, 10.0));
     window.step();
-    window.drop_at(FRONT + vec2(60.0, 10.0));
+    window.drop_at(beside + vec2(60.0, 10.0));
     wait(&mut window, |_| true);
     assert_ne!(before.yaw, window.state().camera().yaw);
     assert_eq!(strips(&window), 0);

@@ -11,7 +11,7 @@ use glam::DVec3;
 use plait_core::mesh::TriMesh;
 use plait_core::progress::{Cancelled, Progress};
 use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
-use plait_core::weave::{ElasticEnergy, FaceDistortion, Improvement};
+use plait_core::weave::{Anchor, ElasticEnergy, FaceDistortion, Improvement};
 use thiserror::Error;
 
 /// Why an operation of the engine failed. The design is unchanged.
@@ -100,6 +100,22 @@ pub struct Proposal {
     pub energy: Option<ElasticEnergy>,
     /// The spine on the design mesh. A closed one does not repeat its first point.
     pub polyline: Vec<DVec3>,
+    /// The anchors that it passes in order; none for a suggestion.
+    pub anchors: Vec<Anchor>,
+}
+
+/// What strips are searched for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Search {
+    /// Strips through a point of [`Scene::design_mesh`].
+    Point(SurfacePoint),
+    /// Strips through anchors in order; `replaces` is the placed strip that is edited.
+    Anchors {
+        /// The anchors; at least one.
+        anchors: Vec<Anchor>,
+        /// The strip that is edited. It does not block directions.
+        replaces: Option<StripId>,
+    },
 }
 
 /// Options of an export.
@@ -132,16 +148,21 @@ pub struct ExportReport {
 /// All errors are [`EngineError::Cancelled`], or a failure with its reason.
 #[allow(clippy::missing_errors_doc)] // said once, above
 pub trait Engine: Send {
-    /// The proposals through a point of [`Scene::design_mesh`], best first. `first` is called with a proposal found
-    /// early, before it is known to be the best.
+    /// The proposals of a search, best first. `first` is called with a proposal found early, before it is known to be the
+    /// best.
     fn proposals(
         &mut self,
-        at: SurfacePoint,
+        search: &Search,
         first: &mut dyn FnMut(Proposal),
         progress: &Progress,
     ) -> Result<Vec<Proposal>, EngineError>;
-    /// Places a proposal of this engine.
-    fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError>;
+    /// Places a proposal of this engine, or puts it in the place of a strip.
+    fn place(
+        &mut self,
+        proposal: &Proposal,
+        replaces: Option<StripId>,
+        progress: &Progress,
+    ) -> Result<StripId, EngineError>;
     /// Removes a placed strip.
     fn remove(&mut self, strip: StripId, progress: &Progress) -> Result<(), EngineError>;
     /// Undoes the last change.
@@ -291,6 +312,8 @@ pub struct Strip {
     pub length: f64,
     /// Whether it is shown.
     pub visible: bool,
+    /// The anchors that it was placed through; none if it was not placed by hand.
+    pub anchors: Vec<Anchor>,
 }
 
 /// A problem of the design or the embedding.

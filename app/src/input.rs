@@ -1,8 +1,8 @@
 //! Translates pointer events over the 3D view to intents, by a state machine without a window.
 //!
-//! A left click places a strip, or pins a node or an arc. Left or middle drag orbits, right drag or Shift with middle
-//! drag pans. The wheel browses proposals over the surface, and zooms over the background or with Ctrl. Positions are
-//! in points from the top left corner of the view.
+//! A left click acts on what is under the pointer, and so does a left drag over the surface. Left drag beside the model, left
+//! drag with Alt and middle drag orbit; right drag or Shift with middle drag pans. The wheel browses proposals over the
+//! surface, and zooms over the background or with Ctrl. Positions are in points from the top left corner of the view.
 
 use glam::Vec2;
 
@@ -31,6 +31,8 @@ pub struct Held {
     pub shift: bool,
     /// Ctrl, or Command on a Mac.
     pub ctrl: bool,
+    /// Alt, or Option on a Mac.
+    pub alt: bool,
 }
 
 /// An event of the pointer.
@@ -57,9 +59,9 @@ pub enum PointerEvent {
 pub enum Under {
     /// No surface.
     Background,
-    /// The surface.
+    /// The surface, or something on it that a left drag acts on.
     Surface,
-    /// A node or an arc of the layout that can be pinned.
+    /// Something that a left drag does not act on: a node or an arc of the layout.
     Part,
 }
 
@@ -72,10 +74,14 @@ pub enum Intent {
     Leave,
     /// Show the proposal this many further on.
     Browse(i32),
-    /// Place the proposal shown.
-    Place(Vec2),
-    /// Pin or unpin the node or arc under the pointer.
-    Pin(Vec2),
+    /// Act on what is under the pointer; with the keys held when the button went down.
+    Click(Vec2, Held),
+    /// Grab what is at a position.
+    Grab(Vec2),
+    /// Drag what was grabbed to a position.
+    Drag(Vec2),
+    /// Let go of what was grabbed.
+    Drop(Vec2),
     /// Rotate the view by a drag.
     Orbit(Vec2),
     /// Move the view by a drag.
@@ -91,10 +97,23 @@ enum Drag {
     Pending {
         button: Button,
         from: Vec2,
-        pan: bool,
+        held: Held,
+        moves: Moves,
     },
     Orbit(Button),
     Pan(Button),
+    Grab(Button),
+}
+
+/// What a drag moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Moves {
+    /// The camera around the model.
+    Orbit,
+    /// The camera sideways.
+    Pan,
+    /// What is under the pointer.
+    Object,
 }
 
 /// The state machine.
@@ -136,8 +155,13 @@ impl Input {
                 if self.is_dragging() {
                     return None;
                 }
-                let pan = button == Button::Secondary || (button == Button::Middle && held.shift);
-                self.drag = Drag::Pending { button, from: at, pan };
+                let moves = match button {
+                    Button::Secondary => Moves::Pan,
+                    Button::Middle if held.shift => Moves::Pan,
+                    Button::Primary if under == Under::Surface && !held.alt => Moves::Object,
+                    _ => Moves::Orbit,
+                };
+                self.drag = Drag::Pending { button, from: at, held, moves };
                 None
             }
             PointerEvent::Released(button, at) => self.released(button, at, under),
@@ -152,34 +176,47 @@ impl Input {
         match self.drag {
             Drag::None => Some(Intent::Hover(to)),
             Drag::Pending { from, .. } if from.distance(to) <= CLICK_SLOP => None,
-            Drag::Pending { button, from, pan: true } => {
-                self.drag = Drag::Pan(button);
-                Some(Intent::Pan(to - from))
+            Drag::Pending { button, from, moves, .. } => {
+                let (drag, intent) = match moves {
+                    Moves::Pan => (Drag::Pan(button), Intent::Pan(to - from)),
+                    Moves::Orbit => (Drag::Orbit(button), Intent::Orbit(to - from)),
+                    Moves::Object => (Drag::Grab(button), Intent::Grab(from)),
+                };
+                self.drag = drag;
+                Some(intent)
             }
-            Drag::Pending { button, from, pan: false } => {
-                self.drag = Drag::Orbit(button);
-                Some(Intent::Orbit(to - from))
-            }
+            Drag::Grab(_) => Some(Intent::Drag(to)),
             Drag::Orbit(_) => Some(Intent::Orbit(to - from.unwrap_or(to))),
             Drag::Pan(_) => Some(Intent::Pan(to - from.unwrap_or(to))),
         }
     }
 
     fn released(&mut self, button: Button, at: Vec2, under: Under) -> Option<Intent> {
-        let held = match self.drag {
+        let (pressed, intent) = match self.drag {
             Drag::None => return None,
-            Drag::Pending { button, .. } | Drag::Orbit(button) | Drag::Pan(button) => button,
+            Drag::Pending { button: Button::Primary, held, .. } if under != Under::Background => {
+                (Button::Primary, Intent::Click(at, held))
+            }
+            Drag::Grab(button) => (button, Intent::Drop(at)),
+            Drag::Pending { button, .. } | Drag::Orbit(button) | Drag::Pan(button) => (button, Intent::Hover(at)),
         };
-        if held != button {
+        if pressed != button {
             return None;
         }
-        let click = matches!(self.drag, Drag::Pending { button: Button::Primary, .. });
         self.drag = Drag::None;
-        Some(match under {
-            Under::Surface if click => Intent::Place(at),
-            Under::Part if click => Intent::Pin(at),
-            _ => Intent::Hover(at),
-        })
+        Some(intent)
+    }
+
+    /// Whether something is grabbed.
+    pub fn is_grabbing(&self) -> bool {
+        matches!(self.drag, Drag::Grab(_))
+    }
+
+    /// Ends a grab; the button that is still down does nothing more.
+    pub fn let_go(&mut self) {
+        if let Drag::Grab(button) = self.drag {
+            self.drag = Drag::Pan(button);
+        }
     }
 
     fn turned(&mut self, notches: f32, held: Held, under: Under) -> Option<Intent> {
@@ -201,7 +238,7 @@ mod tests {
     use super::*;
 
     const HERE: Vec2 = Vec2::new(100.0, 100.0);
-    const FREE: Held = Held { shift: false, ctrl: false };
+    const FREE: Held = Held { shift: false, ctrl: false, alt: false };
 
     fn at_rest() -> Input {
         let mut input = Input::default();
@@ -221,32 +258,57 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_click_places_on_the_surface_and_pins_parts_of_the_layout() {
-        for over in [Under::Surface, Under::Background, Under::Part] {
+    fn a_steady_click_acts_on_what_is_under_the_pointer() {
+        let shift = Held { shift: true, ..FREE };
+        for (over, held) in
+            [(Under::Surface, FREE), (Under::Surface, shift), (Under::Background, FREE), (Under::Part, FREE)]
+        {
             let mut input = at_rest();
-            assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), over), None);
+            assert_eq!(input.handle(PointerEvent::Pressed(Button::Primary, HERE, held), over), None);
             let near = HERE + Vec2::new(2.0, 1.0);
             assert_eq!(input.handle(PointerEvent::Moved(near), over), None);
-            let expected = match over {
-                Under::Surface => Intent::Place(near),
-                Under::Part => Intent::Pin(near),
-                Under::Background => Intent::Hover(near),
-            };
+            let expected = if over == Under::Background { Intent::Hover(near) } else { Intent::Click(near, held) };
             assert_eq!(input.handle(PointerEvent::Released(Button::Primary, near), over), Some(expected));
             assert!(!input.is_dragging());
         }
     }
 
     #[test]
-    fn drags_orbit_or_pan_and_place_nothing() {
+    fn middle_right_and_alt_drags_orbit_or_pan() {
         let delta = Vec2::new(10.0, 0.0);
         let end = Some(Intent::Hover(HERE + delta + Vec2::Y));
         let orbit = [None, Some(Intent::Orbit(delta)), Some(Intent::Orbit(Vec2::Y)), end];
         let pan = [None, Some(Intent::Pan(delta)), Some(Intent::Pan(Vec2::Y)), end];
-        assert_eq!(drag(Button::Primary, FREE), orbit);
+        assert_eq!(drag(Button::Primary, Held { alt: true, ..FREE }), orbit);
         assert_eq!(drag(Button::Middle, FREE), orbit);
-        assert_eq!(drag(Button::Middle, Held { shift: true, ctrl: false }), pan);
+        assert_eq!(drag(Button::Middle, Held { shift: true, ..FREE }), pan);
         assert_eq!(drag(Button::Secondary, FREE), pan);
+    }
+
+    #[test]
+    fn a_left_drag_over_the_surface_grabs_and_beside_it_orbits() {
+        let there = HERE + Vec2::new(10.0, 0.0);
+        let end = there + Vec2::Y;
+        let expected = [None, Some(Intent::Grab(HERE)), Some(Intent::Drag(end)), Some(Intent::Drop(end))];
+        assert_eq!(drag(Button::Primary, FREE), expected);
+        for over in [Under::Background, Under::Part] {
+            let mut input = at_rest();
+            input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), over);
+            // What comes under the pointer during a drag does not matter.
+            let moved = input.handle(PointerEvent::Moved(there), Under::Surface);
+            assert_eq!(moved, Some(Intent::Orbit(there - HERE)));
+        }
+    }
+
+    #[test]
+    fn what_was_let_go_is_not_dropped() {
+        let mut input = at_rest();
+        input.handle(PointerEvent::Pressed(Button::Primary, HERE, FREE), Under::Surface);
+        input.handle(PointerEvent::Moved(HERE * 2.0), Under::Surface);
+        assert!(input.is_grabbing());
+        input.let_go();
+        let released = input.handle(PointerEvent::Released(Button::Primary, HERE * 2.0), Under::Surface);
+        assert_eq!(released, Some(Intent::Hover(HERE * 2.0)));
     }
 
     #[test]
@@ -254,7 +316,7 @@ mod tests {
         let mut input = at_rest();
         assert_eq!(input.handle(PointerEvent::Wheel(-1.0, FREE), Under::Surface), Some(Intent::Browse(1)));
         assert_eq!(input.handle(PointerEvent::Wheel(2.0, FREE), Under::Surface), Some(Intent::Browse(-2)));
-        let ctrl = Held { shift: false, ctrl: true };
+        let ctrl = Held { ctrl: true, ..FREE };
         for (held, over) in [(ctrl, Under::Surface), (FREE, Under::Background)] {
             let zoom = input.handle(PointerEvent::Wheel(1.0, held), over);
             assert!(matches!(zoom, Some(Intent::Zoom(f, at)) if f < 1.0 && at == HERE), "{zoom:?}");

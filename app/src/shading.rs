@@ -115,6 +115,19 @@ pub fn corner_normals(positions: &[DVec3], faces: &[[u32; 3]], crease: f64) -> V
     faces.iter().enumerate().map(|(f, face)| face.map(|v| at(f, v))).collect()
 }
 
+/// The handle of an anchor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Handle {
+    /// Where the anchor is.
+    pub position: DVec3,
+    /// The ends of its direction; `None` for an anchor without direction.
+    pub tips: Option<[DVec3; 2]>,
+    /// Whether it is selected.
+    pub selected: bool,
+    /// Whether the pointer is over it.
+    pub pointed: bool,
+}
+
 /// Everything that is drawn over the surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlay<'a> {
@@ -128,6 +141,10 @@ pub struct Overlay<'a> {
     pub layout: Option<&'a LayoutPreview>,
     /// The node or arc that a click would pin or unpin.
     pub part: Option<LayoutPart>,
+    /// The handles of the edited strip.
+    pub handles: &'a [Handle],
+    /// The placed strip under the pointer.
+    pub pointed: Option<StripId>,
     /// Whether placed strips are shown.
     pub strips: bool,
     /// The place of a message.
@@ -141,7 +158,7 @@ pub fn overlay(overlay: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     let layout = overlay.layout;
     if overlay.strips {
         for strip in overlay.scene.strips.iter().filter(|s| s.visible) {
-            let selected = overlay.selected == Some(strip.id);
+            let selected = overlay.selected == Some(strip.id) || overlay.pointed == Some(strip.id);
             let points = points(&strip.polyline);
             match (selected, layout) {
                 (true, _) => outlined(&mut lines, points, strip.closed, SELECTED, 4.5),
@@ -159,6 +176,7 @@ pub fn overlay(overlay: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     if let Some(proposal) = overlay.proposal {
         outlined(&mut lines, points(&proposal.polyline), proposal.curve.closed, PROPOSED, 3.6);
     }
+    overlay.handles.iter().for_each(|h| draw_handle(h, &mut lines, &mut markers));
     if let Some(place) = overlay.place {
         let position = place.as_vec3().to_array();
         markers.push(Marker { position, colour: [0xd9, 0x3b, 0x36, 0xff], radius: 7.0, hidden: 0.5, square: false });
@@ -195,6 +213,24 @@ fn draw_layout(layout: &LayoutPreview, part: Option<LayoutPart>, lines: &mut Vec
         }
         markers.push(marker);
     }
+}
+
+/// A disc, with a line and two smaller discs along the direction if there is one.
+fn draw_handle(handle: &Handle, lines: &mut Vec<Polyline>, markers: &mut Vec<Marker>) {
+    let colour = if handle.selected { SELECTED } else { PROPOSED };
+    let grow = if handle.pointed { 1.5 } else { 0.0 };
+    let mut disc = |position: DVec3, radius: f32| {
+        let position = position.as_vec3().to_array();
+        let outer = Marker { position, colour: PINNED_CORE, radius: radius + 2.0, hidden: 0.25, square: false };
+        markers.push(outer.clone());
+        markers.push(Marker { colour, radius, ..outer });
+    };
+    if let Some(tips) = handle.tips {
+        let colour = if handle.selected { SELECTED } else { PROPOSED };
+        outlined(lines, points(&tips), false, colour, 2.0);
+        tips.into_iter().for_each(|tip| disc(tip, 4.0 + grow));
+    }
+    disc(handle.position, 6.0 + grow);
 }
 
 /// A line with its outline.

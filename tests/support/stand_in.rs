@@ -8,11 +8,11 @@ use std::time::Duration;
 use glam::DVec3;
 use plait_app::engine::{
     BuiltIn, Detail, DisplaySurface, EmbeddingStep, EmbeddingSummary, Engine, EngineError, ExportOptions, ExportReport,
-    LayoutArc, LayoutNode, LayoutPart, LayoutPreview, Opener, Proposal, Scene, Source, Strip, StripId,
+    LayoutArc, LayoutNode, LayoutPart, LayoutPreview, Opener, Proposal, Scene, Search, Source, Strip, StripId,
 };
 use plait_core::mesh::{TriMesh, builtin};
 use plait_core::progress::Progress;
-use plait_core::surface::{SurfaceCurve, SurfaceIndex, SurfacePoint};
+use plait_core::surface::{SurfaceCurve, SurfaceIndex};
 use plait_core::weave::{FaceDistortion, Fit, Improvement};
 
 /// Opens a rounded cube, whatever is asked for. With one strip it has a layout; every strip is the same.
@@ -71,13 +71,13 @@ pub fn moved(step: usize) -> f64 {
 impl Engine for Session {
     fn proposals(
         &mut self,
-        _: SurfacePoint,
+        _: &Search,
         _: &mut dyn FnMut(Proposal),
         _: &Progress,
     ) -> Result<Vec<Proposal>, EngineError> {
         Ok(vec![self.suggest(&Progress::new())?])
     }
-    fn place(&mut self, _: &Proposal, _: &Progress) -> Result<StripId, EngineError> {
+    fn place(&mut self, _: &Proposal, _: Option<StripId>, _: &Progress) -> Result<StripId, EngineError> {
         self.change(self.strips + 1);
         Ok(StripId(self.strips))
     }
@@ -97,7 +97,13 @@ impl Engine for Session {
     }
     fn suggest(&mut self, _: &Progress) -> Result<Proposal, EngineError> {
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
-        Ok(Proposal { curve, energy: None, cost: 1.0, polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2] })
+        Ok(Proposal {
+            curve,
+            energy: None,
+            cost: 1.0,
+            polyline: vec![DVec3::new(0.0, 0.3, 0.3); 2],
+            anchors: Vec::new(),
+        })
     }
     fn improve(
         &mut self,
@@ -166,7 +172,14 @@ impl Engine for Session {
     }
     fn scene(&self) -> Arc<Scene> {
         let valid = self.strips > 0;
-        let strip = |i| Strip { id: StripId(i), polyline: Vec::new(), closed: true, length: 1.0, visible: true };
+        let strip = |i| Strip {
+            id: StripId(i),
+            polyline: Vec::new(),
+            closed: true,
+            length: 1.0,
+            visible: true,
+            anchors: Vec::new(),
+        };
         Arc::new(Scene {
             model: Arc::default(),
             design_mesh: Arc::clone(&self.mesh),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use egui::{Modifiers, pos2};
-use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use egui_kittest::kittest::Queryable as _;
 
 use super::{FRONT, Window, click, hover, open, strips, wait};
 

@@ -28,8 +28,17 @@ pub fn run(arguments: &RenderArguments, opener: &dyn Opener) -> anyhow::Result<(
 /// The whole model, with everything that the window shows of it.
 fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
     let layout = scene.layout.as_deref();
-    let overlay =
-        shading::Overlay { scene, proposal: None, selected: None, layout, part: None, strips: true, place: None };
+    let overlay = shading::Overlay {
+        scene,
+        proposal: None,
+        selected: None,
+        layout,
+        part: None,
+        handles: &[],
+        pointed: None,
+        strips: true,
+        place: None,
+    };
     let (lines, markers) = shading::overlay(&overlay);
     let mut camera = Camera {
         yaw: arguments.yaw.to_radians(),

@@ -7,7 +7,6 @@ use std::sync::Arc;
 use plait_core::dual::Colour;
 use plait_core::embed::{Next, Snapshot};
 use plait_core::progress::Progress;
-use plait_core::surface::SurfacePoint;
 use plait_core::weave::{
     self, Export, Goal, IMPROVEMENT_ROUNDS, Improvement, MeshRole, Options, QuadSize, Session, WeaveError,
 };
@@ -18,7 +17,7 @@ use super::layout_state::LayoutState;
 use super::snapshot::ModelSnapshot;
 use crate::engine::{
     Detail, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, Proposal, Refinement, Scene,
-    StripId,
+    Search, StripId,
 };
 use crate::texts;
 
@@ -54,19 +53,34 @@ impl SessionEngine {
 impl Engine for SessionEngine {
     fn proposals(
         &mut self,
-        at: SurfacePoint,
+        search: &Search,
         first: &mut dyn FnMut(Proposal),
         progress: &Progress,
     ) -> Result<Vec<Proposal>, EngineError> {
         let model = Arc::clone(self.session.model());
-        let found = self.session.proposals_with(at, progress, |p| first(shown_proposal(&model, p)));
-        Ok(found.map_err(without_place)?.into_iter().map(|p| shown_proposal(&model, p)).collect())
+        let first = |p| first(shown_proposal(&model, p));
+        let found = match search {
+            Search::Point(at) => self.session.proposals_with(*at, progress, first),
+            Search::Anchors { anchors, replaces } => {
+                self.session.proposals_through(anchors, replaces.map(|s| weave::StripId(s.0)), progress, first)
+            }
+        };
+        let found = found.map_err(|e| with_place(e, &self.session))?;
+        Ok(found.into_iter().map(|p| shown_proposal(&model, p)).collect())
     }
 
-    fn place(&mut self, proposal: &Proposal, progress: &Progress) -> Result<StripId, EngineError> {
-        let Proposal { curve, cost, energy, .. } = proposal.clone();
-        let proposal = weave::Proposal { curve, cost, energy };
-        let placed = self.session.place(proposal, progress);
+    fn place(
+        &mut self,
+        proposal: &Proposal,
+        replaces: Option<StripId>,
+        progress: &Progress,
+    ) -> Result<StripId, EngineError> {
+        let Proposal { curve, cost, energy, anchors, .. } = proposal.clone();
+        let proposal = weave::Proposal { curve, cost, energy, anchors };
+        let placed = match replaces.map(|s| weave::StripId(s.0)) {
+            None => self.session.place(proposal, progress),
+            Some(id) => self.session.replace(id, proposal, progress).map(|()| id),
+        };
         self.changed(placed).map(|id| StripId(id.0))
     }
 
@@ -197,7 +211,8 @@ fn no_layout() -> EngineError {
 /// A proposal as the window shows it, on the design mesh.
 fn shown_proposal(model: &weave::Model, proposal: weave::Proposal) -> Proposal {
     let polyline = model.on_design_mesh(&proposal.curve);
-    Proposal { curve: proposal.curve, cost: proposal.cost, energy: proposal.energy, polyline }
+    let weave::Proposal { curve, cost, energy, anchors } = proposal;
+    Proposal { curve, cost, energy, polyline, anchors }
 }
 
 fn export_report(export: &Export, folder: &Path) -> ExportReport {

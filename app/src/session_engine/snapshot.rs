@@ -52,6 +52,7 @@ impl ModelSnapshot {
             closed: s.curve.closed,
             length: s.curve.length(&model.loaded.mesh) * model.loaded.units.scale,
             visible: s.visible,
+            anchors: s.anchors.clone(),
         });
         Scene {
             model: Arc::clone(&self.facts),

@@ -30,6 +30,14 @@ pub enum Action {
     Select(Option<StripId>),
     /// Remove a strip.
     Remove(StripId),
+    /// Edit a placed strip through its anchors.
+    Edit(StripId),
+    /// Place the strip that is edited.
+    PlaceEdited,
+    /// Drop the strip that is edited.
+    StopEditing,
+    /// Remove an anchor of the strip that is edited.
+    RemoveAnchor(usize),
     /// Show or hide a strip.
     SetVisible(StripId, bool),
     /// Choose smoothing and curvature radius, without applying them.

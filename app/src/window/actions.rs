@@ -21,6 +21,7 @@ impl PlaitApp {
             Action::AskSave => self.ask_with_name(Asked::Save, ctx),
             Action::AskExport => self.ask_export(ctx),
             Action::Quads(quads) => self.quads = quads,
+            Action::Undo if self.editing.is_some() => self.take_back_anchor(),
             // Undo during a search or an optimisation discards its changes.
             Action::Undo if self.is_optimising() => self.worker.cancel(),
             Action::Undo => self.change(Job::Undo),
@@ -28,6 +29,10 @@ impl PlaitApp {
             Action::Suggest => self.change(Job::Suggest),
             Action::Select(strip) => self.selected = strip,
             Action::Remove(strip) => self.change(Job::Remove(strip)),
+            Action::Edit(strip) => self.edit_strip(strip, None),
+            Action::PlaceEdited => self.place_edited(),
+            Action::StopEditing => self.stop_editing(),
+            Action::RemoveAnchor(index) => self.remove_anchor(index),
             Action::SetVisible(strip, visible) => self.worker.request(Job::SetVisible(strip, visible)),
             Action::ChooseDetail(detail) => self.detail = Some(detail),
             Action::ApplyDetail => {

@@ -9,9 +9,6 @@ use crate::engine::{LayoutPart, LayoutPreview};
 const NODE_RADIUS: f32 = 8.0;
 /// Pick radius of an arc, in points. It is smaller, since strips are placed between arcs.
 const ARC_RADIUS: f32 = 4.0;
-/// Depth behind the surface up to which a point counts as visible, as a fraction of the bounding-box diagonal. Nodes
-/// and arcs may lie a little below the triangles.
-const DEPTH_TOLERANCE: f32 = 0.01;
 
 /// The visible node or arc nearest to `at` on the screen, nodes first. `None` while the layout is hidden or being
 /// optimised.
@@ -29,7 +26,7 @@ fn nearest_node(app: &PlaitApp, layout: &LayoutPreview, at: Vec2) -> Option<Layo
         (distance < NODE_RADIUS).then_some((i, p, distance))
     };
     let nodes = layout.nodes.iter().map(|n| n.position).enumerate().filter_map(near);
-    let best = nodes.filter(|&(_, p, _)| is_visible(app, p)).min_by(|a, b| a.2.total_cmp(&b.2));
+    let best = nodes.filter(|&(_, p, _)| app.sees(p)).min_by(|a, b| a.2.total_cmp(&b.2));
     best.map(|(i, ..)| LayoutPart::Node(i))
 }
 
@@ -44,7 +41,7 @@ fn nearest_arc(app: &PlaitApp, layout: &LayoutPreview, at: Vec2) -> Option<Layou
                 let t = ((at - a).dot(b - a) / (b - a).length_squared().max(1e-6)).clamp(0.0, 1.0);
                 let distance = at.distance(a.lerp(b, t));
                 let nearer = distance < ARC_RADIUS && best.is_none_or(|(_, d)| distance < d);
-                if nearer && is_visible(app, arc.points[k - 1].lerp(*p, f64::from(t))) {
+                if nearer && app.sees(arc.points[k - 1].lerp(*p, f64::from(t))) {
                     best = Some((i, distance));
                 }
             }
@@ -52,16 +49,4 @@ fn nearest_arc(app: &PlaitApp, layout: &LayoutPreview, at: Vec2) -> Option<Layou
         }
     }
     best.map(|(i, _)| LayoutPart::Arc(i))
-}
-
-/// Whether a point is not hidden by the surface.
-fn is_visible(app: &PlaitApp, p: DVec3) -> bool {
-    let (Some(scene), Some(at)) = (&app.scene, app.camera.project(p.as_vec3(), app.view_size)) else { return false };
-    let ray = app.camera.ray(at, app.view_size);
-    let distance = p.as_vec3().distance(ray.origin);
-    match scene.index.ray(ray.origin.as_dvec3(), ray.direction.as_dvec3()) {
-        Some((hit, _)) => hit.position(&scene.design_mesh).as_vec3().distance(ray.origin) > distance - DEPTH_TOLERANCE,
-        // The ray misses the surface at a silhouette.
-        None => true,
-    }
 }

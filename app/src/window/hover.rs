@@ -3,7 +3,18 @@
 use glam::Vec2;
 use plait_core::surface::SurfacePoint;
 
-use crate::engine::{LayoutPart, Proposal};
+use crate::engine::{LayoutPart, Proposal, StripId};
+
+/// A part of the edited strip that can be dragged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Grip {
+    /// The anchor of this index.
+    Anchor(usize),
+    /// An end of the direction of an anchor: 1 the one it points to, -1 the other.
+    Tip(usize, f32),
+    /// A point of the spine.
+    Spine(SurfacePoint),
+}
 
 /// What is under the pointer.
 #[derive(Debug, Default)]
@@ -12,6 +23,10 @@ pub struct Hover {
     pub point: Option<SurfacePoint>,
     /// The node or arc under the pointer, if it can be pinned.
     pub part: Option<LayoutPart>,
+    /// The part of the edited strip under the pointer.
+    pub grip: Option<Grip>,
+    /// The placed strip under the pointer.
+    pub strip: Option<StripId>,
     /// The generation of the latest request, while a reply is expected.
     pub generation: Option<u64>,
     /// The proposals through the point, best first.
@@ -49,7 +64,8 @@ impl Hover {
 
     /// Drops the proposals and the request.
     pub fn clear(&mut self) {
-        *self = Self { calm_at: self.calm_at, point: self.point, part: self.part, ..Self::default() };
+        let Self { calm_at, point, part, grip, strip, .. } = *self;
+        *self = Self { calm_at, point, part, grip, strip, ..Self::default() };
     }
 
     /// Shows the proposal `by` places further on, clamped to the first and the last.
@@ -67,7 +83,7 @@ mod tests {
 
     fn proposal(cost: f64) -> Proposal {
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
-        Proposal { curve, cost, energy: None, polyline: Vec::new() }
+        Proposal { curve, cost, energy: None, polyline: Vec::new(), anchors: Vec::new() }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use plait_core::weave::Improvement;
 
+use super::editing::Editing;
 use super::hover::Hover;
 use super::messages::Tone;
 use super::state::PlaitApp;
@@ -31,10 +32,12 @@ impl PlaitApp {
                 }
                 Reply::Proposals { generation, proposals, complete } => {
                     if let Some(proposal) = self.hover.arrived(generation, proposals, complete) {
-                        self.worker.request(Job::Place(proposal));
-                        self.hover.clear();
+                        let replaces = self.editing.as_ref().and_then(Editing::replaces);
+                        self.stop_editing();
+                        self.worker.request(Job::Place(proposal, replaces));
                     }
                 }
+                Reply::NoProposals { generation, error } => self.found_nothing(generation, &error),
                 Reply::Saved(path) => self.messages.add(Tone::Done, format!("Saved {}", path.display()), None),
                 Reply::Exported(folder, report) => {
                     let text = format!("Exported to {}: {}", folder.display(), report.summary);
@@ -46,6 +49,18 @@ impl PlaitApp {
                     self.failed(&label, error);
                 }
             }
+        }
+    }
+
+    fn found_nothing(&mut self, generation: u64, error: &EngineError) {
+        if self.hover.generation != Some(generation) {
+            return;
+        }
+        self.hover.generation = None;
+        self.hover.place_on_arrival = false;
+        match &mut self.editing {
+            Some(editing) => editing.problem = Some(error.to_string()),
+            None => self.hover.proposals.clear(),
         }
     }
 
@@ -68,6 +83,7 @@ impl PlaitApp {
         self.detail = None;
         self.step = None;
         self.chosen_colours = ColourMode::default();
+        self.stop_editing();
         self.hover = Hover::default();
         self.scene = Some(scene);
         self.camera = Camera { z_up: self.options.z_up, ..Camera::default() };
@@ -80,6 +96,12 @@ impl PlaitApp {
         }
         // The proposals were computed for the old strips.
         self.hover.clear();
+        self.hover.strip = None;
+        let edited = self.editing.as_ref().and_then(Editing::replaces);
+        if edited.is_some_and(|s| scene.strips.iter().all(|strip| strip.id != s)) {
+            self.stop_editing();
+        }
+        self.search_edited();
         if scene.embedding.is_none() && self.scene.as_ref().is_some_and(|s| s.embedding.is_some()) {
             let text = "The strips have changed. The optimised embedding was discarded.";
             self.messages.add(Tone::Note, text.into(), None);

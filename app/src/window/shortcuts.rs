@@ -16,13 +16,16 @@ const REDO_ALTERNATIVE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMM
 const QUIT: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Q);
 
 /// All shortcuts and gestures, by section, as the list shows them.
-const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
+const SHORTCUTS: [(&str, &[(&str, &str)]); 5] = [
     (
         "Weaving",
         &[
             ("Move over the surface", "show the best strip through the point"),
             ("Wheel", "show other strips through the point"),
             ("Click", "place the strip shown"),
+            ("Drag over the surface", "set an anchor with the direction of the drag, and edit the strip through it"),
+            ("Shift+click", "set an anchor, and edit the strip through it"),
+            ("Click or double click on a strip, E", "select it; edit it"),
             ("S", "place a suggested strip"),
             ("Click on a node or an arc", "pin or unpin it"),
             ("I", "improve the layout with other strips; M: stop"),
@@ -33,9 +36,21 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 4] = [
         ],
     ),
     (
+        "Editing a strip",
+        &[
+            ("Click, drag elsewhere", "add an anchor, add one with a direction"),
+            ("Drag an anchor, one of its ends, the spine", "move it, turn it, pull the spine by a new anchor"),
+            ("Delete", "remove the selected anchor"),
+            ("Wheel", "show other strips through the anchors"),
+            ("Click on the spine, Enter", "place the strip"),
+            ("Ctrl+Z", "take back the last anchor"),
+            ("Escape", "drop the strip; a placed one stays as it was"),
+        ],
+    ),
+    (
         "View",
         &[
-            ("Left or middle drag", "orbit"),
+            ("Left drag beside the model, middle drag, Alt+drag", "orbit"),
             ("Right drag, Shift+middle drag", "pan"),
             ("Ctrl+wheel, wheel over the background, pinch", "zoom"),
             ("F", "show the whole model"),
@@ -108,17 +123,29 @@ fn plain_keys(app: &PlaitApp, i: &mut egui::InputState, actions: &mut Vec<Action
         actions.push(escape(app));
     }
     let delete = i.key_pressed(Key::Delete) || i.key_pressed(Key::Backspace);
-    if let Some(strip) = app.selected.filter(|_| delete) {
-        actions.push(Action::Remove(strip));
+    match (&app.editing, app.selected) {
+        (Some(editing), _) => {
+            actions.extend(editing.selected.filter(|_| delete).map(Action::RemoveAnchor));
+            if i.consume_key(Modifiers::NONE, Key::Enter) {
+                actions.push(Action::PlaceEdited);
+            }
+        }
+        (None, Some(strip)) if delete => actions.push(Action::Remove(strip)),
+        (None, _) => {
+            let strip = app.hover.strip.or(app.selected);
+            actions.extend(strip.filter(|_| i.consume_key(Modifiers::NONE, Key::E)).map(Action::Edit));
+        }
     }
 }
 
-/// The action of Escape: closes a window, else cancels the running operation, else deselects.
+/// The action of Escape: closes a window, else drops the edited strip, else cancels the running operation, else deselects.
 fn escape(app: &PlaitApp) -> Action {
     if app.shortcuts_open {
         Action::Shortcuts(false)
     } else if app.about_open {
         Action::About(false)
+    } else if app.editing.is_some() {
+        Action::StopEditing
     } else if app.worker.running().is_some_and(|r| !r.yields) {
         Action::Cancel
     } else {

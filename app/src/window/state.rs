@@ -5,11 +5,12 @@ use std::time::Duration;
 
 use glam::{DVec3, Vec2};
 use plait_core::surface::SurfacePoint;
-use plait_core::weave::Improvement;
+use plait_core::weave::{Anchor, Improvement};
 
 use super::action::ViewOptions;
 use super::dialogs::Dialogs;
-use super::hover::Hover;
+use super::editing::Editing;
+use super::hover::{Grip, Hover};
 use super::messages::Messages;
 use super::prepared::Prepared;
 use crate::camera::Camera;
@@ -21,6 +22,9 @@ use crate::worker::{Running, StoppableWork, Worker};
 
 /// Work that takes longer shows a progress bar.
 const PROGRESS_DELAY: Duration = Duration::from_millis(500);
+/// Depth behind the surface up to which a point counts as visible, on a surface of diagonal 1. Nodes, arcs and spines may lie
+/// a little below the triangles.
+const DEPTH_TOLERANCE: f32 = 0.01;
 /// Default target number of quads of an export.
 const DEFAULT_QUADS: usize = 10_000;
 
@@ -32,6 +36,10 @@ pub struct PlaitApp {
     pub(super) camera: Camera,
     pub(super) input: Input,
     pub(super) hover: Hover,
+    /// The strip that is edited.
+    pub(super) editing: Option<Editing>,
+    /// What is dragged.
+    pub(super) dragged: Option<Grip>,
     pub(super) prepared: Prepared,
     pub(super) options: ViewOptions,
     /// The colour mode chosen; see [`Self::colour_mode`].
@@ -68,6 +76,8 @@ impl PlaitApp {
             camera: Camera::default(),
             input: Input::default(),
             hover: Hover::default(),
+            editing: None,
+            dragged: None,
             prepared: Prepared::default(),
             options: ViewOptions::default(),
             chosen_colours: ColourMode::default(),
@@ -100,6 +110,16 @@ impl PlaitApp {
     /// Number of proposals under the pointer, and the index of the one shown.
     pub fn offered(&self) -> (usize, usize) {
         (self.hover.proposals.len(), self.hover.chosen)
+    }
+
+    /// The spine of the proposal shown, on the design mesh.
+    pub fn shown(&self) -> Option<&Vec<DVec3>> {
+        self.hover.shown().map(|p| &p.polyline)
+    }
+
+    /// The anchors of the strip that is edited, in order; `None` while none is.
+    pub fn anchors(&self) -> Option<&[Anchor]> {
+        self.editing.as_ref().map(Editing::anchors)
     }
 
     /// The strip selected in the list.
@@ -169,6 +189,21 @@ impl PlaitApp {
         let ray = self.camera.ray(at, self.view_size);
         let hit = self.scene.as_ref()?.index.ray(ray.origin.as_dvec3(), ray.direction.as_dvec3());
         hit.map(|(point, _)| point)
+    }
+
+    /// Whether a point is not hidden by the surface.
+    pub(super) fn sees(&self, p: DVec3) -> bool {
+        let Some(scene) = &self.scene else { return false };
+        let Some(at) = self.camera.project(p.as_vec3(), self.view_size) else { return false };
+        let ray = self.camera.ray(at, self.view_size);
+        let distance = p.as_vec3().distance(ray.origin);
+        match scene.index.ray(ray.origin.as_dvec3(), ray.direction.as_dvec3()) {
+            Some((hit, _)) => {
+                hit.position(&scene.design_mesh).as_vec3().distance(ray.origin) > distance - DEPTH_TOLERANCE
+            }
+            // The ray misses the surface at a silhouette.
+            None => true,
+        }
     }
 
     /// Moves the camera to show the whole model.

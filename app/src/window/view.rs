@@ -6,19 +6,13 @@ use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, ScreenDescri
 use egui::{Align2, Color32, FontId, PaintCallbackInfo, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 use glam::Vec2;
 
-use super::hover::Hover;
 use super::prepared::SurfaceInput;
 use super::state::PlaitApp;
-use super::{element_picking, theme};
+use super::{handles, pointer, theme};
 use crate::distortion::ColourMode;
-use crate::input::{Button, Held, Intent, PointerEvent, Under};
+use crate::input::{Button, Held, PointerEvent};
 use crate::render::{Frame, Renderer, SceneInput, Toggles};
 use crate::shading;
-use crate::worker::Job;
-
-/// Distance from a placement or a choice of the wheel, in points, within which no new proposals are requested: a small
-/// movement of the hand must not lose the choice.
-const CALM_RADIUS: f32 = 7.0;
 
 /// Shows the view in the rest of `ui`.
 pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
@@ -31,22 +25,20 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
     let inside = response.contains_pointer() || app.input.is_dragging();
     for event in pointer_events(ui, rect, inside) {
         if let Some(at) = event_position(event) {
-            app.hover.point = app.pick(at);
-            app.hover.part = element_picking::pick(app, at);
+            pointer::look_under(app, at);
         }
-        let under = match (app.hover.part, app.hover.point) {
-            (Some(_), _) => Under::Part,
-            (None, Some(_)) => Under::Surface,
-            (None, None) => Under::Background,
-        };
+        let under = pointer::under(app);
         let intent = app.input.handle(event, under);
         if let Some(intent) = intent {
-            carry_out(app, intent);
+            pointer::carry_out(app, intent);
         }
+    }
+    if response.double_clicked() {
+        pointer::double_click(app);
     }
     if app.input.is_dragging() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
-    } else if response.contains_pointer() && app.hover.part.is_some() {
+    } else if response.contains_pointer() && (app.hover.part.is_some() || app.hover.grip.is_some()) {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
     } else if response.contains_pointer() && app.hover.point.is_some() && !app.is_optimising() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Crosshair);
@@ -58,7 +50,7 @@ pub fn show(app: &mut PlaitApp, ui: &mut Ui) {
 /// The pointer events, in points from the corner of `rect`.
 fn pointer_events(ui: &Ui, rect: Rect, inside: bool) -> Vec<PointerEvent> {
     let at = |p: Pos2| Vec2::new(p.x - rect.min.x, p.y - rect.min.y);
-    let held = |m: &egui::Modifiers| Held { shift: m.shift, ctrl: m.command || m.ctrl };
+    let held = |m: &egui::Modifiers| Held { shift: m.shift, ctrl: m.command || m.ctrl, alt: m.alt };
     let mut list = Vec::new();
     ui.input(|i| {
         for event in &i.events {
@@ -110,84 +102,6 @@ fn event_position(event: PointerEvent) -> Option<Vec2> {
     match event {
         PointerEvent::Moved(at) | PointerEvent::Pressed(_, at, _) | PointerEvent::Released(_, at) => Some(at),
         _ => None,
-    }
-}
-
-fn carry_out(app: &mut PlaitApp, intent: Intent) {
-    match intent {
-        Intent::Hover(at) => hover(app, at),
-        Intent::Leave => {
-            app.hover = Hover::default();
-            app.worker.forget_hover();
-        }
-        Intent::Browse(by) => {
-            app.hover.browse(by);
-            app.hover.calm_at = app.input.position();
-        }
-        Intent::Place(at) => place(app, at),
-        Intent::Pin(_) => pin(app),
-        Intent::Orbit(delta) => app.camera.orbit(delta),
-        Intent::Pan(delta) => app.camera.pan(delta, app.view_size),
-        Intent::Zoom(factor, at) => {
-            let toward = app.hover.point.zip(app.scene.as_ref()).map(|(p, s)| p.position(&s.design_mesh).as_vec3());
-            let toward = toward.unwrap_or_else(|| app.camera.point_at_target_depth(at, app.view_size));
-            app.camera.zoom(factor, toward);
-        }
-    }
-}
-
-fn hover(app: &mut PlaitApp, at: Vec2) {
-    if app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM_RADIUS) {
-        return;
-    }
-    app.hover.calm_at = None;
-    // Over a node or an arc a click pins it. During an optimisation a placement would cancel that.
-    if app.hover.part.is_some() || app.is_optimising() {
-        app.hover.clear();
-        app.worker.forget_hover();
-        return;
-    }
-    match app.hover.point {
-        Some(_) if app.hover.asked_at == Some(at) => {}
-        Some(point) => {
-            app.hover.generation = Some(app.worker.hover(point));
-            app.hover.asked_at = Some(at);
-            app.hover.place_on_arrival = false;
-        }
-        None => {
-            app.hover.clear();
-            app.worker.forget_hover();
-        }
-    }
-}
-
-/// Pins or unpins the node or arc under the pointer.
-fn pin(app: &mut PlaitApp) {
-    let pinned = |part| app.layout().and_then(|l| l.is_pinned(part)).map(|pinned| (part, pinned));
-    if let Some((part, pinned)) = app.hover.part.and_then(pinned) {
-        app.worker.request(Job::SetPinned(part, !pinned));
-    }
-}
-
-fn place(app: &mut PlaitApp, at: Vec2) {
-    if app.is_optimising() {
-        return;
-    }
-    let calm_here = app.hover.calm_at.is_some_and(|c| c.distance(at) < CALM_RADIUS);
-    match app.hover.shown().cloned() {
-        Some(proposal) if app.hover.generation.is_none() => {
-            app.hover.clear();
-            app.worker.request(Job::Place(proposal));
-            app.hover.calm_at = Some(at);
-        }
-        _ if app.hover.generation.is_some() => app.hover.place_on_arrival = true,
-        // After a placement at this position nothing is shown: request the next proposals.
-        _ => {
-            if calm_here {
-                app.hover.calm_at = None;
-            }
-            hover(app, at);
-        }
     }
 }
 
@@ -253,6 +167,8 @@ fn scene_input(app: &mut PlaitApp) -> SceneInput {
         selected: app.selected,
         layout: app.layout().filter(|_| app.options.layout),
         part: app.hover.part,
+        handles: &handles::of(app),
+        pointed: app.hover.strip,
         strips: app.options.stripes && colour_mode == ColourMode::Regions,
         place: app.messages.place(),
     };
@@ -261,22 +177,27 @@ fn scene_input(app: &mut PlaitApp) -> SceneInput {
     SceneInput { surface, lines, markers }
 }
 
-/// Shows "2 of 9" beside the pointer.
+/// Shows "2 of 9" beside the pointer, or why no strip passes the anchors.
 fn proposal_counter(app: &PlaitApp, ui: &Ui, rect: Rect) {
-    let Some(at) = app.input.position().filter(|_| !app.input.is_dragging()) else { return };
+    let resting = !app.input.is_dragging() || app.input.is_grabbing();
+    let Some(at) = app.input.position().filter(|_| resting) else { return };
     let count = app.hover.proposals.len();
-    if count < 2 || app.hover.shown().is_none() {
-        return;
-    }
-    let text = format!("{} of {count}", app.hover.chosen + 1);
+    let problem = app.editing.as_ref().and_then(|e| e.problem.clone());
+    let (text, colour) = match problem {
+        Some(problem) => (problem, theme::BAD),
+        None if app.hover.shown().is_none() => return,
+        None => {
+            let green = Color32::from_rgb(shading::PROPOSED[0], shading::PROPOSED[1], shading::PROPOSED[2]);
+            (format!("{} of {count}", app.hover.chosen + 1), green)
+        }
+    };
     let painter = ui.painter().with_clip_rect(rect);
     let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
     let anchor = rect.min + vec2(at.x + 18.0, at.y + 16.0);
     let size = galley.size() + vec2(16.0, 8.0);
     let corner = anchor.min(rect.max - size - vec2(4.0, 4.0));
     let label = Rect::from_min_size(corner, size);
-    let green = Color32::from_rgb(shading::PROPOSED[0], shading::PROPOSED[1], shading::PROPOSED[2]);
-    painter.rect(label, 9.0, green, Stroke::new(1.0, theme::RAISED), StrokeKind::Outside);
+    painter.rect(label, 9.0, colour, Stroke::new(1.0, theme::RAISED), StrokeKind::Outside);
     painter.galley(Align2::CENTER_CENTER.align_size_within_rect(galley.size(), label).min, galley, Color32::WHITE);
 }
 
@@ -284,7 +205,7 @@ fn proposal_counter(app: &PlaitApp, ui: &Ui, rect: Rect) {
 mod tests {
     use super::*;
 
-    const FREE: Held = Held { shift: false, ctrl: false };
+    const FREE: Held = Held { shift: false, ctrl: false, alt: false };
 
     #[test]
     fn a_notch_reported_twice_in_a_frame_counts_once() {

@@ -18,8 +18,8 @@ use crate::engine::{
 pub enum Job {
     /// Open a model or a design in place of the present one.
     Open(Source),
-    /// Place a proposal.
-    Place(Proposal),
+    /// Place a proposal, or put it in the place of a strip.
+    Place(Proposal, Option<StripId>),
     /// Remove a strip.
     Remove(StripId),
     /// Show or hide a strip.
@@ -49,7 +49,7 @@ impl Job {
     pub fn label(&self) -> String {
         match self {
             Self::Open(source) => format!("Opening {}", source.name()),
-            Self::Place(_) => "Placing the strip".into(),
+            Self::Place(..) => "Placing the strip".into(),
             Self::Remove(_) => "Removing the strip".into(),
             Self::SetVisible(..) => "Updating the view".into(),
             Self::Undo => "Undoing".into(),
@@ -78,7 +78,7 @@ impl Job {
         matches!(
             self,
             Self::Open(_)
-                | Self::Place(_)
+                | Self::Place(..)
                 | Self::Remove(_)
                 | Self::Undo
                 | Self::Redo
@@ -103,7 +103,7 @@ pub enum Reply {
     Changed(Arc<Scene>),
     /// The design is the same; a part of its scene was added that takes long to compute.
     Completed(Arc<Scene>),
-    /// The proposals of a hover request.
+    /// The proposals of a search request.
     Proposals {
         /// The generation of the request.
         generation: u64,
@@ -111,6 +111,13 @@ pub enum Reply {
         proposals: Vec<Proposal>,
         /// Whether these are all proposals.
         complete: bool,
+    },
+    /// A search found no strip, for a reason.
+    NoProposals {
+        /// The generation of the request.
+        generation: u64,
+        /// The reason.
+        error: EngineError,
     },
     /// The search found strips with a lower objective.
     StripsImproved {
@@ -133,7 +140,7 @@ pub enum Reply {
     Failed {
         /// The name of the job.
         label: String,
-        /// The reason; never [`EngineError::Cancelled`] for a hover request.
+        /// The reason; never [`EngineError::Cancelled`] for a search request.
         error: EngineError,
     },
 }
@@ -172,7 +179,7 @@ pub struct Running {
     pub since: Instant,
     /// Its progress, by which it can be cancelled.
     pub progress: Arc<Progress>,
-    /// Whether any job precedes it: a hover request, or the completion of the scene.
+    /// Whether any job precedes it: a search request, or the completion of the scene.
     pub yields: bool,
     /// The stop flag, if it can be stopped.
     pub stoppable: Option<StopFlag>,

@@ -1,6 +1,6 @@
 //! The worker: a thread that owns the engine, so that the window never waits.
 //!
-//! Jobs that change the design are queued and done in order. Of hover requests only the latest counts: a newer one, or
+//! Jobs that change the design are queued and done in order. Of search requests only the latest counts: a newer one, or
 //! any job, cancels the one that runs. A search for better strips and an optimisation of the embedding send
 //! intermediate results and can be stopped; a job that changes the strips cancels them. Opening a model cancels
 //! everything. Every reply wakes the window.
@@ -16,13 +16,11 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use plait_core::surface::SurfacePoint;
-
 pub use messages::{Job, Reply, Running, StopFlag, StoppableWork};
 use shared::Shared;
 use task::{Replies, WorkerLoop};
 
-use crate::engine::Opener;
+use crate::engine::{Opener, Search};
 
 /// The window's end of the worker.
 pub struct Worker {
@@ -54,11 +52,11 @@ impl Worker {
         Ok(Self { shared, replies, thread: Some(thread) })
     }
 
-    /// Queues a job. Jobs precede hover requests; [`Job::Open`] drops all earlier jobs.
+    /// Queues a job. Jobs precede search requests; [`Job::Open`] drops all earlier jobs.
     pub fn request(&self, job: Job) {
         let mut state = self.shared.lock();
         let open = matches!(job, Job::Open(_));
-        state.hover = None;
+        state.search = None;
         if open {
             state.jobs.clear();
         }
@@ -70,21 +68,20 @@ impl Worker {
         self.shared.wake.notify_one();
     }
 
-    /// Requests the proposals through a point, in place of any earlier such request. Returns the generation of the
-    /// request.
-    pub fn hover(&self, at: SurfacePoint) -> u64 {
+    /// Requests the proposals of a search, in place of any earlier such request. Returns the generation of the request.
+    pub fn search(&self, search: Search) -> u64 {
         let mut state = self.shared.lock();
         state.generation += 1;
-        state.hover = Some((state.generation, at));
+        state.search = Some((state.generation, search));
         state.cancel_yielding();
         self.shared.wake.notify_one();
         state.generation
     }
 
-    /// Drops the hover request.
-    pub fn forget_hover(&self) {
+    /// Drops the search request.
+    pub fn forget_search(&self) {
         let mut state = self.shared.lock();
-        state.hover = None;
+        state.search = None;
         state.cancel_yielding();
     }
 
@@ -92,7 +89,7 @@ impl Worker {
     pub fn cancel(&self) {
         let mut state = self.shared.lock();
         state.jobs.clear();
-        state.hover = None;
+        state.search = None;
         if let Some(running) = &state.running {
             running.progress.cancel();
         }
@@ -113,7 +110,7 @@ impl Worker {
     /// Whether no task runs or waits.
     pub fn is_idle(&self) -> bool {
         let state = self.shared.lock();
-        state.running.is_none() && state.jobs.is_empty() && state.hover.is_none() && !state.incomplete
+        state.running.is_none() && state.jobs.is_empty() && state.search.is_none() && !state.incomplete
     }
 
     /// The next reply, if there is one.

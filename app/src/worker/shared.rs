@@ -3,18 +3,17 @@
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use plait_core::surface::SurfacePoint;
-
 use super::messages::{Job, Running};
+use crate::engine::Search;
 
 /// What is to be done and what is being done.
 #[derive(Default)]
 pub(super) struct State {
     /// Jobs that wait, in order.
     pub(super) jobs: VecDeque<Job>,
-    /// The latest hover request, with its generation.
-    pub(super) hover: Option<(u64, SurfacePoint)>,
-    /// Generation of the latest hover request.
+    /// The latest search request, with its generation.
+    pub(super) search: Option<(u64, Search)>,
+    /// Generation of the latest search request.
     pub(super) generation: u64,
     /// Whether the scene may be incomplete, see [`crate::engine::Engine::complete`].
     pub(super) incomplete: bool,

@@ -6,16 +6,15 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use plait_core::progress::Progress;
-use plait_core::surface::SurfacePoint;
 
 use super::messages::{Job, Reply, Running, StopFlag};
 use super::shared::Shared;
-use crate::engine::{Engine, EngineError, Opener, Source};
+use crate::engine::{Engine, EngineError, Opener, Search, Source};
 
 enum Task {
     Job(Job),
-    /// Find the proposals through a point.
-    Hover(u64, SurfacePoint),
+    /// Find the proposals of a search.
+    Search(u64, Search),
     /// Complete the scene, while there is nothing else to do.
     Complete,
 }
@@ -24,7 +23,7 @@ impl Task {
     fn label(&self) -> String {
         match self {
             Self::Job(job) => job.label(),
-            Self::Hover(..) => "Searching for strips".into(),
+            Self::Search(..) => "Searching for strips".into(),
             Self::Complete => "Computing the layout".into(),
         }
     }
@@ -62,7 +61,7 @@ impl WorkerLoop {
     pub(super) fn run(mut self) {
         while let Some((task, running)) = self.next() {
             let Running { label, yields, .. } = running.clone();
-            let changes = !matches!(task, Task::Hover(..) | Task::Complete);
+            let changes = !matches!(task, Task::Search(..) | Task::Complete);
             // A panic of the engine must cost one operation, not the design of the user.
             let result = catch_unwind(AssertUnwindSafe(|| self.work(task, &running)))
                 .unwrap_or_else(|_| Err(EngineError::failed("internal error; the design is unchanged")));
@@ -89,7 +88,7 @@ impl WorkerLoop {
             }
             let task = match state.jobs.pop_front() {
                 Some(job) => Some(Task::Job(job)),
-                None => state.hover.take().map(|(generation, at)| Task::Hover(generation, at)),
+                None => state.search.take().map(|(generation, search)| Task::Search(generation, search)),
             };
             let task = task.or_else(|| std::mem::take(&mut state.incomplete).then_some(Task::Complete));
             if let Some(task) = task {
@@ -119,14 +118,17 @@ impl WorkerLoop {
                 let Some(engine) = &mut self.engine else { return Err(EngineError::failed("no model is open")) };
                 run_job(job, &mut **engine, running, &self.replies).map(Some)
             }
-            Task::Hover(generation, at) => {
+            Task::Search(generation, search) => {
                 let Some(engine) = &mut self.engine else { return Ok(None) };
                 let mut first = |proposal| {
                     let proposals = vec![proposal];
                     self.replies.send_now(Reply::Proposals { generation, proposals, complete: false });
                 };
-                let proposals = engine.proposals(at, &mut first, progress)?;
-                Ok(Some(Reply::Proposals { generation, proposals, complete: true }))
+                Ok(Some(match engine.proposals(&search, &mut first, progress) {
+                    Ok(proposals) => Reply::Proposals { generation, proposals, complete: true },
+                    Err(EngineError::Cancelled) => return Err(EngineError::Cancelled),
+                    Err(error) => Reply::NoProposals { generation, error },
+                }))
             }
             Task::Complete => {
                 let Some(engine) = &mut self.engine else { return Ok(None) };
@@ -151,14 +153,14 @@ fn run_job(job: Job, engine: &mut dyn Engine, running: &Running, replies: &Repli
     let progress = &*running.progress;
     match job {
         Job::Open(_) => {}
-        Job::Place(proposal) => drop(engine.place(&proposal, progress)?),
+        Job::Place(proposal, replaces) => drop(engine.place(&proposal, replaces, progress)?),
         Job::Remove(strip) => engine.remove(strip, progress)?,
         Job::SetVisible(strip, visible) => engine.set_visible(strip, visible)?,
         Job::Undo => engine.undo(progress)?,
         Job::Redo => engine.redo(progress)?,
         Job::Suggest => {
             let proposal = engine.suggest(progress)?;
-            engine.place(&proposal, progress)?;
+            engine.place(&proposal, None, progress)?;
         }
         Job::SetDetail(detail) => engine.set_detail(detail, progress)?,
         Job::SetPinned(part, pinned) => engine.set_pinned(part, pinned)?,

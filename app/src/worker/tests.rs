@@ -14,7 +14,7 @@ use plait_core::weave::Improvement;
 use super::*;
 use crate::engine::{
     BuiltIn, Detail, EmbeddingStep, Engine, EngineError, ExportOptions, ExportReport, LayoutPart, LayoutPreview,
-    Proposal, Scene, Source, StripId,
+    Proposal, Scene, Search, Source, StripId,
 };
 
 /// An engine whose proposals have the number of the picked face as their cost. Undo runs until it is cancelled, redo
@@ -60,17 +60,24 @@ fn until_cancelled(progress: &Progress) -> EngineError {
 impl Engine for Fake {
     fn proposals(
         &mut self,
-        at: SurfacePoint,
+        search: &Search,
         _: &mut dyn FnMut(Proposal),
         progress: &Progress,
     ) -> Result<Vec<Proposal>, EngineError> {
+        let Search::Point(at) = search else { return Err(EngineError::failed("no anchors here")) };
         if at.face.index() == 0 {
             return Err(until_cancelled(progress));
         }
         let curve = SurfaceCurve { crossings: Vec::new(), closed: true };
-        Ok(vec![Proposal { curve, cost: at.face.index() as f64, energy: None, polyline: Vec::new() }])
+        Ok(vec![Proposal {
+            curve,
+            cost: at.face.index() as f64,
+            energy: None,
+            polyline: Vec::new(),
+            anchors: Vec::new(),
+        }])
     }
-    fn place(&mut self, _: &Proposal, _: &Progress) -> Result<StripId, EngineError> {
+    fn place(&mut self, _: &Proposal, _: Option<StripId>, _: &Progress) -> Result<StripId, EngineError> {
         Ok(StripId(0))
     }
     fn remove(&mut self, _: StripId, _: &Progress) -> Result<(), EngineError> {
@@ -149,8 +156,8 @@ fn reply(worker: &Worker) -> Reply {
     worker.replies.recv_timeout(Duration::from_secs(20)).unwrap()
 }
 
-fn point(face: usize) -> SurfacePoint {
-    SurfacePoint { face: FaceId::new(face), weights: [1.0 / 3.0; 3] }
+fn point(face: usize) -> Search {
+    Search::Point(SurfacePoint { face: FaceId::new(face), weights: [1.0 / 3.0; 3] })
 }
 
 fn running(worker: &Worker, label: &str) {
@@ -162,12 +169,12 @@ fn running(worker: &Worker, label: &str) {
 }
 
 #[test]
-fn the_latest_hover_request_cancels_the_running_one() {
+fn the_latest_search_request_cancels_the_running_one() {
     let worker = worker();
-    worker.hover(point(0));
+    worker.search(point(0));
     running(&worker, "Searching for strips");
-    worker.hover(point(3));
-    let latest = worker.hover(point(5));
+    worker.search(point(3));
+    let latest = worker.search(point(5));
     // The first was cancelled; the last reply is the one of the latest request.
     loop {
         let Reply::Proposals { generation, proposals, complete: true } = reply(&worker) else {
@@ -181,9 +188,9 @@ fn the_latest_hover_request_cancels_the_running_one() {
 }
 
 #[test]
-fn jobs_precede_and_drop_hover_requests() {
+fn jobs_precede_and_drop_search_requests() {
     let worker = worker();
-    worker.hover(point(0));
+    worker.search(point(0));
     running(&worker, "Searching for strips");
     worker.request(Job::Save("x".into()));
     assert!(matches!(reply(&worker), Reply::Saved(_)));
@@ -304,9 +311,9 @@ fn opening_a_model_drops_the_jobs_that_wait() {
 }
 
 #[test]
-fn jobs_without_a_model_fail_and_hover_requests_have_no_reply() {
+fn jobs_without_a_model_fail_and_search_requests_have_no_reply() {
     let worker = Worker::start(Arc::new(FakeOpener), || ()).unwrap();
-    worker.hover(point(1));
+    worker.search(point(1));
     worker.request(Job::Suggest);
     let Reply::Failed { error, .. } = reply(&worker) else { panic!("not a failure") };
     assert_eq!(error.to_string(), "no model is open");

@@ -13,6 +13,9 @@
 //!
 //! The start is the anchor with the fewest directions. If all anchors have a direction, step 1 gives the exact cost.
 //!
+//! Alternatives are the cheapest loops of each direction in which an anchor without direction can be left: steps 2 and 3 for
+//! each such anchor as the start.
+//!
 //! The thesis runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
 
 use glam::DVec3;
@@ -22,7 +25,7 @@ use super::distance_field::DistanceField;
 use super::graph::{ElasticaGraph, NO_STATE, State};
 use super::mask::DirectionMask;
 use super::open_curves::{BoundaryPath, BoundarySearch};
-use super::proposals::Proposals;
+use super::proposals::{FoundLoop, Proposals, Selection};
 use super::route::{ROUNDING, Route};
 use super::workspace::SearchWorkspace;
 use crate::mesh::VertexId;
@@ -50,49 +53,71 @@ pub struct AnchorQuery<'a> {
     pub anchors: &'a [Anchor],
     /// Directions that are closed.
     pub mask: &'a DirectionMask,
-    /// Largest number of search states to settle; then the best loop found so far is returned without proof.
+    /// Which loops are returned. Alternatives are as in [`ProposalQuery`](super::ProposalQuery).
+    pub selection: Selection<'a>,
+    /// Largest number of search states to settle; then the best loops found so far are returned without proof.
     pub budget: u64,
 }
 
+impl<'a> AnchorQuery<'a> {
+    /// The cheapest loop through anchors.
+    pub fn cheapest(anchors: &'a [Anchor], mask: &'a DirectionMask) -> Self {
+        Self { anchors, mask, selection: Selection::cheapest(), budget: 20_000_000 }
+    }
+
+    /// The cheapest loop, and alternatives in other directions at the anchors without direction.
+    pub fn alternatives(anchors: &'a [Anchor], mask: &'a DirectionMask) -> Self {
+        Self { selection: Selection::alternatives(), budget: 60_000_000, ..Self::cheapest(anchors, mask) }
+    }
+}
+
 impl ElasticaGraph {
-    /// The cheapest loop through all anchors in order. On open surfaces it may instead be a curve from boundary to
-    /// boundary that passes them in order.
+    /// The cheapest loops through all anchors in order. On open surfaces the cheapest may instead be a curve from boundary
+    /// to boundary that passes them in order. `watch` is called with the cheapest when it is proved, before alternatives
+    /// are searched.
     ///
     /// # Errors
     ///
     /// When cancelled.
-    pub fn loop_through(
+    pub fn loops_through(
         &self,
         query: &AnchorQuery,
         work: &mut SearchWorkspace,
         progress: &Progress,
+        mut watch: impl FnMut(&FoundLoop),
     ) -> Result<Proposals, Cancelled> {
         let mut budget = SearchBudget { progress, limit: query.budget, settled: 0 };
-        let (route, proved) = self.route_through(query, work, &mut budget)?;
-        let loops = route.and_then(|route| self.found_loop(&route)).into_iter().collect();
+        let mut show = |route: &Route| {
+            if let Some(found) = self.found_loop(route) {
+                watch(&found);
+            }
+        };
+        let (routes, proved) = self.routes_through(query, work, &mut budget, &mut show)?;
+        let loops = self.distinct(routes, &query.selection, &mut work.neighbourhood);
         Ok(Proposals { loops, proved, settled: budget.settled })
     }
 
-    /// The route of [`Self::loop_through`], from the first anchor on if it is closed, and whether it is proved to be the
-    /// cheapest.
-    pub(super) fn route_through(
+    /// The routes of [`Self::loops_through`], from the first anchor on if they are closed, and whether none is missing.
+    pub(super) fn routes_through(
         &self,
         query: &AnchorQuery,
         work: &mut SearchWorkspace,
         budget: &mut SearchBudget,
-    ) -> Result<(Option<Route>, bool), Cancelled> {
-        let mut best = None;
+        show: &mut dyn FnMut(&Route),
+    ) -> Result<(Vec<Route>, bool), Cancelled> {
+        let mut routes = Vec::new();
         let outcome = AnchoredSearch::new(self, query, work, budget)
-            .and_then(|search| search.map_or(Ok(()), |mut s| s.solve(budget, &mut best)));
+            .and_then(|search| search.map_or(Ok(()), |mut s| s.all(query, budget, &mut routes, show)));
         if outcome == Err(Stop::Cancelled) {
             return Err(Cancelled);
         }
-        if let (Some(route), Some(first)) = (best.as_mut().filter(|r| r.closed), query.anchors.first()) {
+        for route in routes.iter_mut().filter(|r| r.closed) {
             // The search may have started at another anchor.
-            let start = route.states.iter().position(|&e| self.origin(e) == first.vertex);
+            let first = query.anchors.first().map(|a| a.vertex);
+            let start = route.states.iter().position(|&e| Some(self.origin(e)) == first);
             route.states.rotate_left(start.unwrap_or(0));
         }
-        Ok((best, outcome.is_ok()))
+        Ok((routes, outcome.is_ok()))
     }
 }
 
@@ -160,6 +185,54 @@ impl<'a> AnchoredSearch<'a> {
             round_costs,
             open_curve,
         }))
+    }
+
+    /// The cheapest route, and the alternatives that the query asks for.
+    fn all(
+        &mut self,
+        query: &AnchorQuery,
+        budget: &mut SearchBudget,
+        routes: &mut Vec<Route>,
+        show: &mut dyn FnMut(&Route),
+    ) -> Result<(), Stop> {
+        let mut best = None;
+        let solved = self.solve(budget, &mut best);
+        let Some(best) = best else { return solved };
+        show(&best);
+        let limit = best.cost * query.selection.factor.max(1.0) as f32;
+        routes.push(best);
+        solved?;
+        if query.selection.factor <= 1.0 || self.leg_costs.iter().any(|c| !c.is_finite()) {
+            return Ok(());
+        }
+        for _ in 0..self.departures.len() {
+            if self.departures[0].len() > 1 {
+                self.alternatives(limit, budget, routes)?;
+            }
+            self.rotate();
+        }
+        Ok(())
+    }
+
+    /// Makes the second anchor the start.
+    fn rotate(&mut self) {
+        self.departures.rotate_left(1);
+        self.leg_costs.rotate_left(1);
+        self.leg_starts.rotate_left(1);
+        self.radii.rotate_left(1);
+        self.round_costs = vec![f32::INFINITY; self.departures[0].len()];
+    }
+
+    /// The cheapest loop of each direction at the start, up to a cost.
+    fn alternatives(&mut self, limit: f32, budget: &mut SearchBudget, routes: &mut Vec<Route>) -> Result<(), Stop> {
+        let least = self.leg_costs.iter().sum();
+        self.compute_cost_to_go(limit * ROUNDING, least, budget)?;
+        for i in 0..self.round_costs.len() {
+            if self.round_costs[i] <= limit {
+                routes.extend(self.loop_from(self.departures[0][i], limit * ROUNDING, budget)?);
+            }
+        }
+        Ok(())
     }
 
     fn solve(&mut self, budget: &mut SearchBudget, best: &mut Option<Route>) -> Result<(), Stop> {

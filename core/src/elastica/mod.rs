@@ -40,5 +40,5 @@ pub use graph::ElasticaGraph;
 pub use homology::HomologyClasses;
 pub use mask::DirectionMask;
 pub use options::{ElasticaError, ElasticaOptions};
-pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals};
+pub use proposals::{Certainty, FoundLoop, ProposalQuery, Proposals, Selection};
 pub use workspace::SearchWorkspace;

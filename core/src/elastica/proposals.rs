@@ -41,6 +41,32 @@ pub enum Certainty {
     Proved,
 }
 
+/// Which loops of a search are returned.
+#[derive(Debug, Clone, Copy)]
+pub struct Selection<'a> {
+    /// Alternatives may cost up to this multiple of the cheapest loop. 1: only the cheapest, which is faster.
+    pub factor: f64,
+    /// Largest number of loops returned.
+    pub max: usize,
+    /// Each alternative has a vertex farther than this from every cheaper loop of similar length (in mesh units, measured
+    /// along edges).
+    pub separation: f64,
+    /// If given, of homologous loops that pass the vertex in about the same direction only the cheapest is returned.
+    pub classes: Option<&'a HomologyClasses>,
+}
+
+impl Selection<'_> {
+    /// The cheapest loop. The separation of 0.05, on a surface of diagonal 1, only matters for alternatives.
+    pub fn cheapest() -> Self {
+        Self { factor: 1.0, max: 1, separation: 0.05, classes: None }
+    }
+
+    /// The cheapest loop and up to 15 alternatives of at most 1.5 times its cost.
+    pub fn alternatives() -> Self {
+        Self { factor: 1.5, max: 16, ..Self::cheapest() }
+    }
+}
+
 /// A query for loops through a vertex.
 #[derive(Debug, Clone, Copy)]
 pub struct ProposalQuery<'a> {
@@ -51,15 +77,8 @@ pub struct ProposalQuery<'a> {
     pub direction: Option<DVec3>,
     /// Directions that are closed.
     pub mask: &'a DirectionMask,
-    /// Alternatives may cost up to this multiple of the cheapest loop. 1: only the cheapest, which is faster.
-    pub factor: f64,
-    /// Largest number of loops returned.
-    pub max: usize,
-    /// Each alternative has a vertex farther than this from every cheaper loop of similar length (in mesh units, measured
-    /// along edges).
-    pub separation: f64,
-    /// If given, of homologous loops that pass the vertex in about the same direction only the cheapest is returned.
-    pub classes: Option<&'a HomologyClasses>,
+    /// Which loops are returned.
+    pub selection: Selection<'a>,
     /// A loop found at a vertex nearby, under the same mask: the search starts from its detour through the vertex.
     pub nearby: Option<&'a FoundLoop>,
     /// Largest number of search states to settle; then the best loop found so far is returned without proof. A state takes
@@ -69,24 +88,14 @@ pub struct ProposalQuery<'a> {
 
 impl<'a> ProposalQuery<'a> {
     /// The cheapest loop through a vertex, in any direction. The budget, about a second, suffices for a proof on ordinary
-    /// meshes. The separation of 0.05, on a surface of diagonal 1, only matters for alternatives.
+    /// meshes.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
-        Self {
-            vertex,
-            direction: None,
-            mask,
-            factor: 1.0,
-            max: 1,
-            separation: 0.05,
-            classes: None,
-            nearby: None,
-            budget: 4_000_000,
-        }
+        Self { vertex, direction: None, mask, selection: Selection::cheapest(), nearby: None, budget: 4_000_000 }
     }
 
     /// The cheapest loop and up to 15 alternatives of at most 1.5 times its cost.
     pub fn alternatives(vertex: VertexId, mask: &'a DirectionMask) -> Self {
-        Self { factor: 1.5, max: 16, budget: 20_000_000, ..Self::cheapest(vertex, mask) }
+        Self { selection: Selection::alternatives(), budget: 20_000_000, ..Self::cheapest(vertex, mask) }
     }
 }
 
@@ -165,7 +174,7 @@ impl ElasticaGraph {
             work,
             budget: SearchBudget { progress, limit: query.budget, settled: 0 },
             vertex: query.vertex,
-            factor: query.factor.max(1.0) as f32,
+            factor: query.selection.factor.max(1.0) as f32,
         };
         let nearby = query.nearby.filter(|l| l.curve.closed && query.direction.is_none());
         let initial = nearby.and_then(|l| self.initial_loop(query.mask, query.vertex, &l.path));
@@ -181,40 +190,41 @@ impl ElasticaGraph {
         };
         let settled = search.budget.settled;
         let any = !routes.is_empty();
-        let loops = self.distinct(routes, query, &mut work.neighbourhood);
-        if loops.is_empty() && any && query.direction.is_none() && query.factor < FALLBACK_FACTOR {
-            return self.proposals(&ProposalQuery { factor: FALLBACK_FACTOR, ..*query }, work, progress);
+        let loops = self.distinct(routes, &query.selection, &mut work.neighbourhood);
+        if loops.is_empty() && any && query.direction.is_none() && query.selection.factor < FALLBACK_FACTOR {
+            let selection = Selection { factor: FALLBACK_FACTOR, ..query.selection };
+            return self.proposals(&ProposalQuery { selection, ..*query }, work, progress);
         }
         Ok(Proposals { loops, proved, settled })
     }
 
     /// The cheapest of `routes` that are not contractible and not copies of one another.
-    fn distinct(
+    pub(super) fn distinct(
         &self,
         mut routes: Vec<Route>,
-        query: &ProposalQuery,
+        selection: &Selection,
         neighbourhood: &mut CurveNeighbourhood,
     ) -> Vec<FoundLoop> {
         routes.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.states.cmp(&b.states)));
-        let Some(limit) = routes.first().map(|r| r.cost * query.factor.max(1.0) as f32 * ROUNDING) else {
+        let Some(limit) = routes.first().map(|r| r.cost * selection.factor.max(1.0) as f32 * ROUNDING) else {
             return Vec::new();
         };
         let mut kept: Vec<KeptLoop> = Vec::new();
         for route in routes.iter().take_while(|r| r.cost <= limit) {
-            if kept.len() >= query.max {
+            if kept.len() >= selection.max {
                 break;
             }
             if kept.iter().any(|k| self.is_copy(route, k)) {
                 continue;
             }
             let Some(found) = self.found_loop(route) else { continue };
-            let class = query.classes.and_then(|c| c.of(&self.mesh, &found.curve));
+            let class = selection.classes.and_then(|c| c.of(&self.mesh, &found.curve));
             let heading = self.heading(route);
             let equivalent = |k: &KeptLoop| k.class == class && k.heading.dot(heading).abs() > SAME_DIRECTION;
             if class.is_some() && kept.iter().any(equivalent) {
                 continue;
             }
-            let near = neighbourhood.of(&self.mesh, &found.curve, query.separation);
+            let near = neighbourhood.of(&self.mesh, &found.curve, selection.separation);
             kept.push(KeptLoop { found, near, class, heading });
         }
         kept.into_iter().map(|k| k.found).collect()

@@ -28,7 +28,7 @@ pub use index::SurfaceIndex;
 pub(crate) use index::nearest_in_triangle;
 pub use metric::Metric;
 pub use point::SurfacePoint;
-pub use relax::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, curve_cost, relax};
+pub use relax::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, Waypoint, curve_cost, relax};
 pub use shape_operator::{face_curvature, second_fundamental_form};
 pub use trace_geodesic::{GeodesicTrace, PolarMap, trace_geodesic};
 pub use vertex_path::VertexPath;

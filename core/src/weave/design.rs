@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::mesh::{MeshSource, TriMesh, fingerprint};
 use crate::output::{self, FileKind, OutputError};
 use crate::surface::SurfaceCurve;
+use crate::weave::anchor::Anchor;
 use crate::weave::options::Options;
 
 /// Number of a strip, unique within a design and never reused.
@@ -44,6 +45,9 @@ pub struct Strip {
     pub energy: Option<ElasticEnergy>,
     /// Whether it is drawn.
     pub visible: bool,
+    /// The anchors that its spine passes in order; none if it was not placed by hand.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub anchors: Vec<Anchor>,
 }
 
 impl Strip {
@@ -173,7 +177,7 @@ mod tests {
 
     fn strip(curve: SurfaceCurve) -> Strip {
         let energy = Some(ElasticEnergy { found: 2.0, relaxed: 1.5 });
-        Strip { id: StripId(3), curve, on_proxy: None, cost: 2.5, energy, visible: false }
+        Strip { id: StripId(3), curve, on_proxy: None, cost: 2.5, energy, visible: false, anchors: Vec::new() }
     }
 
     fn design() -> (TriMesh, Design) {

@@ -74,6 +74,9 @@ pub enum WeaveError {
     /// There is no such strip.
     #[error("there is no strip {}", .0.0)]
     NoStrip(StripId),
+    /// No strip passes the anchors.
+    #[error(transparent)]
+    NoLoop(#[from] NoLoop),
     /// A folder could not be made.
     #[error("the folder {path} cannot be made: {source}")]
     Folder {
@@ -91,6 +94,23 @@ pub enum WeaveError {
         /// The mesh.
         path: PathBuf,
     },
+}
+
+/// Why no strip passes all anchors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum NoLoop {
+    /// It would run along a placed strip.
+    #[error("strip {} runs there already; edit or remove it, or move an anchor", .0.0 + 1)]
+    Blocked(StripId),
+    /// It would run along several placed strips.
+    #[error("placed strips run there already; edit or remove them, or move an anchor")]
+    BlockedBySeveral,
+    /// The anchors lie on different pieces of the surface.
+    #[error("the anchors lie on different pieces of the surface")]
+    Apart,
+    /// The anchors cannot be joined by a smooth curve that closes or ends on the boundary.
+    #[error("no smooth curve through the anchors closes; turn or move an anchor")]
+    Turns,
 }
 
 /// Why no strip is suggested.

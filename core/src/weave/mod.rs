@@ -4,6 +4,8 @@
 //! holds a model, a design and its history, together with the arrangement of the strips ([`Woven`]). Searches for strips
 //! are in `search`, the files of a result in `export`, data that only a window shows in `preview`.
 
+mod anchor;
+mod anchored;
 mod design;
 mod embedding;
 mod error;
@@ -23,9 +25,10 @@ mod session;
 mod tests;
 mod woven;
 
+pub use anchor::Anchor;
 pub use design::{Design, DesignError, ElasticEnergy, Pin, Strip, StripId};
 pub use embedding::{InitialLayout, PinnedElements, initial_layout, optimise};
-pub use error::{NoSuggestion, WeaveError};
+pub use error::{NoLoop, NoSuggestion, WeaveError};
 pub use export::files::existing_files;
 pub use export::input::{CollapseLength, EmbeddingInput, ExportOptions, QuadSize, Watch};
 pub use export::refine::embed_and_refine;
@@ -39,7 +42,7 @@ pub use preview::arc_polylines::{embedding_polylines, move_ends, smoothed_polyli
 pub use preview::design_overlay::{FacePieces, refined_corners};
 pub use preview::face_distortion::{FaceDistortion, face_distortion, largest_aspect};
 pub use proposal::Proposal;
-pub use script::{Script, ScriptError, Step, replay};
+pub use script::{Script, ScriptAnchor, ScriptError, Step, replay};
 pub use search::fit::Fit;
 pub use search::improve::{IMPROVEMENT_ROUNDS, Improvement};
 pub use search::suggest::Goal;

@@ -5,7 +5,8 @@ use glam::DVec3;
 use crate::elastica::{ElasticaGraph, FoundLoop};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
-use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, SurfacePoint, relax};
+use crate::surface::{RelaxOptions, Relaxed, SurfaceCurve, Waypoint, relax};
+use crate::weave::anchor::Anchor;
 use crate::weave::design::ElasticEnergy;
 use crate::weave::error::WeaveError;
 use crate::weave::loop_contacts::LoopContacts;
@@ -19,6 +20,8 @@ pub struct Proposal {
     pub cost: f64,
     /// Its elastic energy, if it is a loop of the elastica graph.
     pub energy: Option<ElasticEnergy>,
+    /// The anchors that it was searched through; none for a suggestion.
+    pub anchors: Vec<Anchor>,
 }
 
 impl Proposal {
@@ -26,7 +29,7 @@ impl Proposal {
     pub(in crate::weave) fn found(l: &FoundLoop) -> Self {
         let energy = l.length + l.bending;
         let energy = ElasticEnergy { found: energy, relaxed: energy };
-        Self { curve: l.curve.clone(), cost: l.cost, energy: Some(energy) }
+        Self { curve: l.curve.clone(), cost: l.cost, energy: Some(energy), anchors: Vec::new() }
     }
 
     /// The same proposal with a relaxed curve.
@@ -45,18 +48,18 @@ impl Proposal {
 /// feature or strip more often than before.
 const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
-/// A found loop relaxed to a smooth curve through `at` that crosses no feature and no placed strip more often than the loop
+/// A found loop relaxed to a smooth curve through the waypoints that crosses no feature and no placed strip more often than the loop
 /// does. If that fails in every tube, the loop as it was found.
 pub(in crate::weave) fn smoothed_proposal(
     graph: &ElasticaGraph,
     contacts: &LoopContacts<'_>,
     found: &FoundLoop,
-    at: SurfacePoint,
+    waypoints: &[Waypoint],
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
     let before = contacts.count(&found.curve);
     for tube in TUBES {
-        let options = RelaxOptions { waypoints: vec![at], tube, ..Default::default() };
+        let options = RelaxOptions { waypoints: waypoints.to_vec(), tube, ..Default::default() };
         match relax(graph.mesh(), &found.curve, &options, progress) {
             Ok(relaxed) if contacts.count(&relaxed.curve).at_most(&before) => {
                 return Ok(Proposal::found(found).relaxed(relaxed));

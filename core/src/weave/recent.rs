@@ -6,9 +6,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::elastica::{Certainty, DirectionMask, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace};
+use crate::elastica::{Certainty, DirectionMask, ElasticaGraph, FoundLoop, ProposalQuery, SearchWorkspace, Selection};
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
+use crate::weave::design::StripId;
 use crate::weave::woven::Woven;
 
 /// Capacity of the cache, in vertices: those under a small movement of the pointer. Chosen by hand.
@@ -25,6 +26,16 @@ pub(in crate::weave) struct RecentSearches {
     woven: Option<Arc<Woven>>,
     /// The most recent last.
     found: VecDeque<Found>,
+    /// The directions open to the strip that was edited last.
+    edited: Option<MaskWithout>,
+}
+
+/// The directions that are open to a strip which replaces a placed one.
+#[derive(Debug)]
+struct MaskWithout {
+    woven: Arc<Woven>,
+    replaced: StripId,
+    mask: Arc<DirectionMask>,
 }
 
 /// Loops found at a vertex.
@@ -72,6 +83,24 @@ impl RecentSearches {
         result
     }
 
+    /// The directions that are open while a strip is replaced; computed once for one strip.
+    pub(in crate::weave) fn mask_without(
+        &mut self,
+        woven: &Arc<Woven>,
+        replaced: StripId,
+        compute: impl FnOnce() -> DirectionMask,
+    ) -> Arc<DirectionMask> {
+        if let Some(known) = &self.edited
+            && known.replaced == replaced
+            && Arc::ptr_eq(&known.woven, woven)
+        {
+            return Arc::clone(&known.mask);
+        }
+        let mask = Arc::new(compute());
+        self.edited = Some(MaskWithout { woven: Arc::clone(woven), replaced, mask: Arc::clone(&mask) });
+        mask
+    }
+
     fn search(
         &mut self,
         graph: &ElasticaGraph,
@@ -87,8 +116,8 @@ impl RecentSearches {
         // The best loop at the previous vertex starts the search.
         let nearby = self.found.iter().rev().find_map(|f| f.best.as_ref());
         let mut searched = |mask: &DirectionMask, work: &mut SearchWorkspace| {
-            let classes = Some(&woven.classes);
-            let query = ProposalQuery { nearby, classes, ..ProposalQuery::alternatives(vertex, mask) };
+            let selection = Selection { classes: Some(&woven.classes), ..Selection::alternatives() };
+            let query = ProposalQuery { nearby, selection, ..ProposalQuery::alternatives(vertex, mask) };
             let found = graph.proposals_with(&query, work, progress, |certainty, l| {
                 if certainty == Certainty::Proved {
                     *best = Some(l.clone());

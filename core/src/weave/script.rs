@@ -13,7 +13,9 @@ use thiserror::Error;
 
 use crate::mesh::{LoadError, MeshSource};
 use crate::progress::Progress;
-use crate::weave::design::{Design, DesignError};
+use crate::surface::SurfacePoint;
+use crate::weave::anchor::Anchor;
+use crate::weave::design::{Design, DesignError, StripId};
 use crate::weave::error::NoSuggestion;
 use crate::weave::error::WeaveError;
 use crate::weave::options::Options;
@@ -27,6 +29,12 @@ use crate::weave::session::Session;
 pub enum Step {
     /// Point at the surface: proposals through the nearest point of the surface, the cheapest first.
     Hover([f64; 3]),
+    /// Set an anchor after those set so far: proposals through all of them, the cheapest first. The first one begins a new
+    /// strip, unless a strip is edited.
+    Anchor(ScriptAnchor),
+    /// Edit the `n`-th of the present strips in the order placed, from 0: proposals through its anchors. Placing replaces
+    /// it.
+    Edit(usize),
     /// Turn the wheel: this many proposals forward, or back if negative, cyclically.
     Browse(i64),
     /// Click: place the current proposal. `false` does nothing.
@@ -41,6 +49,17 @@ pub enum Step {
     Undo(bool),
     /// Redo the change undone last. `false` does nothing.
     Redo(bool),
+}
+
+/// An anchor in a script.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScriptAnchor {
+    /// A point, which snaps to the nearest point of the surface.
+    pub at: [f64; 3],
+    /// The direction of the strip; any if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
 }
 
 /// A weave script.
@@ -155,6 +174,10 @@ fn open(script: &Script, folder: &Path, progress: &Progress) -> Result<Session, 
 struct Shown {
     proposals: Vec<Proposal>,
     current: usize,
+    /// The anchors set so far.
+    anchors: Vec<Anchor>,
+    /// The strip that is edited.
+    replaces: Option<StripId>,
 }
 
 enum StepError {
@@ -168,21 +191,67 @@ impl From<WeaveError> for StepError {
     }
 }
 
+/// The point of the surface nearest to a point in coordinates of the file.
+fn nearest(session: &Session, at: [f64; 3]) -> Result<SurfacePoint, StepError> {
+    let at = session.model().loaded.units.from_file(DVec3::from(at));
+    if !at.is_finite() {
+        return Err(StepError::NotApplicable("a coordinate of the point is not a finite number"));
+    }
+    Ok(session.model().index.nearest(at))
+}
+
 impl Shown {
+    /// Searches through the anchors.
+    fn search(&mut self, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
+        self.proposals = session.proposals_through(&self.anchors, self.replaces, progress, |_| {})?;
+        self.current = 0;
+        Ok(())
+    }
+
+    fn add_anchor(
+        &mut self,
+        ScriptAnchor { at, direction }: ScriptAnchor,
+        session: &mut Session,
+        progress: &Progress,
+    ) -> Result<(), StepError> {
+        let direction = direction.map(DVec3::from);
+        if direction.is_some_and(|d| !d.is_finite() || d == DVec3::ZERO) {
+            return Err(StepError::NotApplicable("the direction is not a finite vector"));
+        }
+        self.anchors.push(Anchor { at: nearest(session, at)?, direction });
+        self.search(session, progress)
+    }
+
+    fn edit(&mut self, n: usize, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
+        let strip = session.design().strips.get(n).ok_or(StepError::NotApplicable("there is no such strip"))?;
+        if strip.anchors.is_empty() {
+            return Err(StepError::NotApplicable("the strip has no anchors"));
+        }
+        *self = Self { anchors: strip.anchors.clone(), replaces: Some(strip.id), ..Self::default() };
+        self.search(session, progress)
+    }
+
+    fn place(&self, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
+        let proposal = self.proposals.get(self.current).cloned();
+        let proposal = proposal.ok_or(StepError::NotApplicable("nothing to place: hover first"))?;
+        match self.replaces {
+            Some(id) => session.replace(id, proposal, progress)?,
+            None => drop(session.place(proposal, progress)?),
+        }
+        Ok(())
+    }
+
     fn apply(&mut self, step: &Step, session: &mut Session, progress: &Progress) -> Result<(), StepError> {
         match *step {
             Step::Hover(at) => {
-                let at = session.model().loaded.units.from_file(DVec3::from(at));
-                if !at.is_finite() {
-                    return Err(StepError::NotApplicable("a coordinate of the point is not a finite number"));
-                }
-                let at = session.model().index.nearest(at);
-                self.proposals = session.proposals(at, progress)?;
-                self.current = 0;
+                let at = nearest(session, at)?;
+                *self = Self { proposals: session.proposals(at, progress)?, ..Self::default() };
                 if self.proposals.is_empty() {
                     return Err(StepError::NotApplicable("no strip passes this point"));
                 }
             }
+            Step::Anchor(anchor) => self.add_anchor(anchor, session, progress)?,
+            Step::Edit(n) => self.edit(n, session, progress)?,
             Step::Browse(by) => {
                 let n = self.proposals.len() as i64;
                 if n == 0 {
@@ -191,9 +260,7 @@ impl Shown {
                 self.current = (self.current as i64 + by).rem_euclid(n) as usize;
             }
             Step::Place(true) => {
-                let proposal = self.proposals.get(self.current).cloned();
-                let proposal = proposal.ok_or(StepError::NotApplicable("nothing to place: hover first"))?;
-                session.place(proposal, progress)?;
+                self.place(session, progress)?;
                 *self = Self::default();
             }
             Step::Suggest(true) => {

@@ -9,6 +9,7 @@ use crate::elastica::{Certainty, FoundLoop};
 use crate::mesh::{LoadedMesh, MeshSource, fingerprint};
 use crate::progress::Progress;
 use crate::surface::{SurfaceCurve, SurfacePoint};
+use crate::weave::anchor::Anchor;
 use crate::weave::design::{Design, Pin, Strip, StripId};
 use crate::weave::error::WeaveError;
 use crate::weave::loop_contacts::LoopContacts;
@@ -36,7 +37,7 @@ pub struct Session {
     undo: Vec<HistoryState>,
     redo: Vec<HistoryState>,
     next_id: u32,
-    recent: RecentSearches,
+    pub(in crate::weave) recent: RecentSearches,
 }
 
 impl Session {
@@ -144,15 +145,19 @@ impl Session {
         progress: &Progress,
         mut first: impl FnMut(Proposal),
     ) -> Result<Vec<Proposal>, WeaveError> {
+        let anchor = Anchor::point(at);
         let at = self.model.to_woven(at);
         let graph = &self.model.graph;
         let vertex = at.nearest_vertex(&self.model.mesh);
         let placed = self.design.strips.iter().map(Strip::woven);
         let contacts = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
-        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &contacts, l, at, progress);
+        let smoothed_proposal = |l: &FoundLoop| {
+            let smooth = smoothed_proposal(graph, &contacts, l, &[at.into()], progress)?;
+            Ok(Proposal { anchors: vec![anchor], ..smooth })
+        };
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
-            Certainty::Found => first(Proposal::found(l)),
+            Certainty::Found => first(Proposal { anchors: vec![anchor], ..Proposal::found(l) }),
             Certainty::Proved => {
                 let smooth = smoothed_proposal(l);
                 if let Ok(smooth) = &smooth {
@@ -178,12 +183,18 @@ impl Session {
     pub fn place(&mut self, proposal: Proposal, progress: &Progress) -> Result<StripId, WeaveError> {
         let id = self.free_id();
         let mut strips = self.design.strips.clone();
-        let curve = self.model.to_design(&proposal.curve)?;
-        let on_proxy = self.model.proxy.is_some().then_some(proposal.curve);
-        strips.push(Strip { id, curve, on_proxy, cost: proposal.cost, energy: proposal.energy, visible: true });
+        strips.push(self.strip_of(id, proposal)?);
         self.change(strips, progress)?;
         self.next_id += 1;
         Ok(id)
+    }
+
+    /// The strip of a proposal.
+    pub(in crate::weave) fn strip_of(&self, id: StripId, proposal: Proposal) -> Result<Strip, WeaveError> {
+        let Proposal { curve: woven, cost, energy, anchors } = proposal;
+        let curve = self.model.to_design(&woven)?;
+        let on_proxy = self.model.proxy.is_some().then_some(woven);
+        Ok(Strip { id, curve, on_proxy, cost, energy, visible: true, anchors })
     }
 
     /// Removes a strip.
@@ -252,7 +263,8 @@ impl Session {
         self.design.pins = pins;
     }
 
-    fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
+    /// Replaces the strips, as a step of the history.
+    pub(in crate::weave) fn change(&mut self, strips: Vec<Strip>, progress: &Progress) -> Result<(), WeaveError> {
         let now = self.replace_state(HistoryState { strips, pins: Vec::new() }, progress)?;
         self.remember(now);
         Ok(())

@@ -51,17 +51,28 @@ impl Woven {
         let reports = assess(&arrangement, &model.vertex_curvatures, &model.corners);
         let strip_map = if strips.is_empty() { None } else { strip_map(&arrangement, &mesh, progress)? };
         progress.report("Excluding directions of strips", 0.95);
-        let mut spine_mask = DirectionMask::all_open();
-        for strip in strips {
-            mask_spine(model, strip, &mut spine_mask);
-        }
+        let spine_mask = mask_spines(model, strips, |_| true);
         let mut mask = spine_mask.clone();
         if let Some(map) = &strip_map {
-            mask_isolines(model, &arrangement, &mesh, map, &mut mask);
+            mask_isolines(model, &arrangement, &mesh, map, |_| true, &mut mask);
         }
         let classes = homology_classes(model, &arrangement);
         progress.report("Ready", 1.0);
         Ok(Self { arrangement, reports, mask, spine_mask, classes, mesh, strip_map })
+    }
+
+    /// The directions in which no further strip may run because of some of the strips, given by their numbers in order.
+    pub(in crate::weave) fn mask_of(
+        &self,
+        model: &Model,
+        strips: &[Strip],
+        closes: impl Fn(usize) -> bool,
+    ) -> DirectionMask {
+        let mut mask = mask_spines(model, strips, &closes);
+        if let Some(map) = &self.strip_map {
+            mask_isolines(model, &self.arrangement, &self.mesh, map, &closes, &mut mask);
+        }
+        mask
     }
 
     /// The red regions: those that cannot be nodes of a layout.
@@ -92,6 +103,15 @@ fn homology_classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses
     HomologyClasses::new(mesh, corners.chain(crossings))
 }
 
+/// Masks the directions along the spines of some of the strips.
+fn mask_spines(model: &Model, strips: &[Strip], closes: impl Fn(usize) -> bool) -> DirectionMask {
+    let mut mask = DirectionMask::all_open();
+    for (_, strip) in strips.iter().enumerate().filter(|(i, _)| closes(*i)) {
+        mask_spine(model, strip, &mut mask);
+    }
+    mask
+}
+
 /// Masks the directions along a strip's spine in the triangles it passes.
 fn mask_spine(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
     let (mesh, curve) = (&model.mesh, strip.woven());
@@ -103,14 +123,21 @@ fn mask_spine(model: &Model, strip: &Strip, mask: &mut DirectionMask) {
     }
 }
 
-/// Masks the directions along the isolines of the strips that cover each triangle.
-fn mask_isolines(model: &Model, arrangement: &Arrangement, mesh: &TriMesh, map: &StripMap, mask: &mut DirectionMask) {
+/// Masks the directions along the isolines of the strips that cover each triangle, of some of them.
+fn mask_isolines(
+    model: &Model,
+    arrangement: &Arrangement,
+    mesh: &TriMesh,
+    map: &StripMap,
+    closes: impl Fn(usize) -> bool,
+    mask: &mut DirectionMask,
+) {
     let mut largest: BTreeMap<(u32, u32), (f64, DVec3)> = BTreeMap::new();
     for f in mesh.faces() {
         for (axis, strip) in map.covered[f.index()].iter().enumerate() {
-            let Some(strip) = strip else { continue };
+            let Some(strip) = strip.filter(|&s| closes(map.strips[s as usize].curve as usize)) else { continue };
             // The largest piece of a triangle of the woven mesh stands for all its pieces.
-            let entry = largest.entry((arrangement.refined.base_face(f.0), *strip)).or_insert((-1.0, DVec3::ZERO));
+            let entry = largest.entry((arrangement.refined.base_face(f.0), strip)).or_insert((-1.0, DVec3::ZERO));
             let area = mesh.face_area(f);
             if area > entry.0 {
                 *entry = (area, map.iso_direction(mesh, f, axis));

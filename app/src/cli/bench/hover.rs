@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use plait_core::elastica::{ProposalQuery, SearchWorkspace};
+use plait_core::elastica::{ProposalQuery, SearchWorkspace, Selection};
 use plait_core::progress::Progress;
 use plait_core::surface::{Metric, SurfacePoint};
 use plait_core::weave::Session;
@@ -86,7 +86,8 @@ fn searches(session: &Session, arguments: &RunArguments, group: &str, report: &m
         figures.settled.push(best.settled as f64);
         let now = Instant::now();
         let classes = Some(&session.woven().classes);
-        let query = ProposalQuery { classes, ..ProposalQuery::alternatives(vertex, mask) };
+        let selection = Selection { classes, ..Selection::alternatives() };
+        let query = ProposalQuery { selection, ..ProposalQuery::alternatives(vertex, mask) };
         let all = model.graph.proposals(&query, &mut work, &progress)?;
         figures.alternatives.push(now.elapsed());
         figures.settled_all.push(all.settled as f64);

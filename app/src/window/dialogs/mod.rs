@@ -5,6 +5,7 @@
 //!
 //! Before files are replaced the user is asked, by the dialog of the system or by a question of our own.
 
+mod asked;
 mod own_dialog;
 mod replace_question;
 mod target;
@@ -13,50 +14,13 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
+pub use asked::Asked;
 use own_dialog::OwnDialog;
 use replace_question::{Decision, ReplaceQuestion};
 use target::{replaced_files, with_extension};
 
 /// A system dialog that returns nothing within this time was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(400);
-/// The purpose of a dialog.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
-    /// A mesh or design to read.
-    Open,
-    /// A design to write.
-    Save,
-    /// A folder to export into.
-    Export,
-}
-
-impl Asked {
-    fn title(self) -> &'static str {
-        match self {
-            Self::Open => "Open a mesh or a design",
-            Self::Save => "Save the design",
-            Self::Export => "Export the layout into a folder",
-        }
-    }
-
-    /// File name extensions of the files that can be chosen.
-    fn extensions(self) -> &'static [&'static str] {
-        match self {
-            Self::Open => &["obj", "off", "ply", "stl", "plait"],
-            Self::Save => &["plait"],
-            Self::Export => &[],
-        }
-    }
-
-    fn verb(self) -> &'static str {
-        match self {
-            Self::Open => "Open",
-            Self::Save => "Save",
-            Self::Export => "Export",
-        }
-    }
-}
-
 enum Answer {
     Chosen(Asked, PathBuf),
     NothingChosen,

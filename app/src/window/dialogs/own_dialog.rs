@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Asked;
+use super::asked::Asked;
 
 /// Our own dialog: the entries of a folder, and a text field for the name.
 pub(super) struct OwnDialog {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Asked;
+use super::asked::Asked;
 
 /// The answer to the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use plait_core::weave::existing_files;
 
-use super::Asked;
+use super::asked::Asked;
 
 /// Extension of a design.
 const DESIGN: &str = "plait";

@@ -32,8 +32,8 @@ fn loops_through_anchors_are_exact() {
             })
             .collect();
         let expected = cheapest_round(&g, &mask, &departures);
-        let query = AnchorQuery { anchors, mask: &mask, budget: u64::MAX };
-        let found = g.loop_through(&query, &mut work, &Progress::new()).unwrap();
+        let query = AnchorQuery { budget: u64::MAX, ..AnchorQuery::cheapest(anchors, &mask) };
+        let found = g.loops_through(&query, &mut work, &Progress::new(), |_| {}).unwrap();
         assert!(found.proved);
         let l = &found.loops[0];
         assert!(same_cost(l.cost as f32, expected), "{anchors:?}: {}, expected {expected}", l.cost);
@@ -49,8 +49,8 @@ fn anchors_on_an_open_surface_can_be_passed_from_boundary_to_boundary() {
     let mask = DirectionMask::all_open();
     let mut work = SearchWorkspace::new();
     let anchors = [10, 20, 30].map(|i| Anchor { vertex: VertexId(i), direction: Some(DVec3::Z) });
-    let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
-    let l = &g.loop_through(&query, &mut work, &Progress::new()).unwrap().loops[0];
+    let query = AnchorQuery { budget: u64::MAX, ..AnchorQuery::cheapest(&anchors, &mask) };
+    let l = &g.loops_through(&query, &mut work, &Progress::new(), |_| {}).unwrap().loops[0];
     assert!(!l.curve.closed && anchors.iter().all(|a| l.path.contains(&a.vertex)));
     assert_eq!(l.curve.check(g.mesh()), Ok(()));
     // Straight along the tube, so there is hardly any alignment or bending cost.

@@ -10,6 +10,7 @@ use super::samples::{ellipsoid, graph, graph_with, torus, tube};
 use crate::elastica::route::Route;
 use crate::elastica::{
     Anchor, AnchorQuery, DirectionMask, ElasticaError, ElasticaGraph, ElasticaOptions, ProposalQuery, SearchWorkspace,
+    Selection,
 };
 use crate::mesh::{FaceId, VertexId};
 use crate::progress::Progress;
@@ -81,8 +82,8 @@ fn a_vertex_without_open_directions_has_no_loops() {
     let found = g.proposals(&ProposalQuery::alternatives(v, &mask), &mut work, &Progress::new()).unwrap();
     assert!(found.loops.is_empty() && found.proved);
     let anchors = [Anchor { vertex: VertexId(80), direction: None }, Anchor { vertex: v, direction: None }];
-    let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
-    let found = g.loop_through(&query, &mut work, &Progress::new()).unwrap();
+    let query = AnchorQuery::cheapest(&anchors, &mask);
+    let found = g.loops_through(&query, &mut work, &Progress::new(), |_| {}).unwrap();
     assert!(found.loops.is_empty() && found.proved);
 }
 
@@ -90,10 +91,11 @@ fn a_vertex_without_open_directions_has_no_loops() {
 fn the_largest_number_of_loops_is_kept() {
     let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
     let mask = DirectionMask::all_open();
-    let query = ProposalQuery { factor: 3.0, max: 3, ..ProposalQuery::alternatives(VertexId(40), &mask) };
+    let selection = Selection { factor: 3.0, max: 3, ..Selection::alternatives() };
+    let query = ProposalQuery { selection, ..ProposalQuery::alternatives(VertexId(40), &mask) };
     let some = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
     assert_eq!(some.loops.len(), 3);
-    let all = ProposalQuery { max: 100, ..query };
+    let all = ProposalQuery { selection: Selection { max: 100, ..selection }, ..query };
     let all = g.proposals(&all, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
     assert_eq!(some.loops, all.loops[..3]);
 }

@@ -8,7 +8,7 @@ use super::reference::{cost_of_steps, same_cost};
 use super::samples::{ellipsoid, graph, research, sample, torus, tube};
 use crate::elastica::{
     Certainty, DirectionMask, ElasticaError, ElasticaGraph, ElasticaOptions, FoundLoop, HomologyClasses, ProposalQuery,
-    Proposals, SearchWorkspace,
+    Proposals, SearchWorkspace, Selection,
 };
 use crate::mesh::VertexId;
 use crate::progress::Progress;
@@ -55,9 +55,11 @@ fn of_homologous_loops_in_one_direction_one_is_proposed() {
         let classes = HomologyClasses::new(g.mesh(), marks.map(VertexId));
         let mut work = SearchWorkspace::new();
         for v in sample(&g, 6) {
-            let query = ProposalQuery { factor: 3.0, ..ProposalQuery::alternatives(v, &mask) };
-            let all = g.proposals(&ProposalQuery { max: 1000, ..query }, &mut work, &Progress::new()).unwrap();
-            let query = ProposalQuery { classes: Some(&classes), ..query };
+            let selection = Selection { factor: 3.0, ..Selection::alternatives() };
+            let query = |selection| ProposalQuery { selection, ..ProposalQuery::alternatives(v, &mask) };
+            let all = query(Selection { max: 1000, ..selection });
+            let all = g.proposals(&all, &mut work, &Progress::new()).unwrap();
+            let query = query(Selection { classes: Some(&classes), ..selection });
             let some = g.proposals(&query, &mut work, &Progress::new()).unwrap();
             assert_eq!(all.loops[0], some.loops[0]);
             fewer += usize::from(some.loops.len() < all.loops.len());
@@ -72,7 +74,7 @@ fn of_homologous_loops_in_one_direction_one_is_proposed() {
                 assert!(same.into_iter().all(|s| heading(s).dot(heading(l)).abs() < 40f64.to_radians().cos()), "{v:?}");
             }
             let missing = |l: &&FoundLoop| !some.loops.iter().any(|s| class(s) == class(l));
-            assert!(some.loops.len() == query.max || !all.loops.iter().any(|l| missing(&l)), "{v:?}");
+            assert!(some.loops.len() == query.selection.max || !all.loops.iter().any(|l| missing(&l)), "{v:?}");
         }
     }
     assert!(fewer > 3, "{fewer}");
@@ -83,7 +85,8 @@ fn open_curves_compete_with_loops() {
     let g = graph(tube(24, 40));
     let mask = DirectionMask::all_open();
     let v = VertexId(20);
-    let query = ProposalQuery { factor: 20.0, max: 100, ..ProposalQuery::alternatives(v, &mask) };
+    let selection = Selection { factor: 20.0, max: 100, ..Selection::alternatives() };
+    let query = ProposalQuery { selection, ..ProposalQuery::alternatives(v, &mask) };
     let found = g.proposals(&query, &mut SearchWorkspace::new(), &Progress::new()).unwrap();
     assert!(found.loops.iter().any(|l| l.curve.closed) && found.loops.iter().any(|l| !l.curve.closed));
     for l in &found.loops {
@@ -188,7 +191,8 @@ fn the_number_of_threads_changes_nothing() {
             let mask = DirectionMask::all_open();
             let mut work = SearchWorkspace::new();
             let find = |v| {
-                let query = ProposalQuery { factor: 4.0, budget: 60_000, ..ProposalQuery::alternatives(v, &mask) };
+                let selection = Selection { factor: 4.0, ..Selection::alternatives() };
+                let query = ProposalQuery { selection, budget: 60_000, ..ProposalQuery::alternatives(v, &mask) };
                 g.proposals(&query, &mut work, &Progress::new()).unwrap()
             };
             sample(&g, 6).map(find).collect::<Vec<_>>()

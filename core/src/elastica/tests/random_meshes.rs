@@ -5,11 +5,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::DVec3;
 use proptest::prelude::*;
 
-use super::reference::{cheapest_round, compare_loops, compare_open_curves, same_cost};
+use super::reference::{cheapest_round, cheapest_rounds, compare_loops, compare_open_curves, cost_of_steps, same_cost};
 use super::samples::{around, graph_with};
 use crate::elastica::budget::SearchBudget;
 use crate::elastica::graph::State;
-use crate::elastica::{Anchor, AnchorQuery, DirectionMask, ElasticaGraph, ElasticaOptions, SearchWorkspace};
+use crate::elastica::route::{ROUNDING, Route};
+use crate::elastica::{Anchor, AnchorQuery, DirectionMask, ElasticaGraph, ElasticaOptions, SearchWorkspace, Selection};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 
@@ -103,30 +104,71 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn alternatives_through_anchors_are_exact(
+        heights in heights(),
+        closed in closed_directions(),
+        anchors in prop::collection::vec((0usize..100, prop::option::of(prop::array::uniform3(-1.0f64..1.0))), 1..4),
+        factor in 1.05f64..1.4,
+    ) {
+        let g = uneven_graph(6, 6, true, &heights);
+        let mask = close_some(&g, &closed);
+        let anchors = at_vertices(&g, &anchors);
+        let mut departures = departures(&g, &mask, &anchors);
+        prop_assume!(departures.iter().all(|d| !d.is_empty()));
+        let selection = Selection { factor, ..Selection::alternatives() };
+        let query = AnchorQuery { selection, budget: u64::MAX, ..AnchorQuery::cheapest(&anchors, &mask) };
+        let progress = Progress::new();
+        let mut budget = SearchBudget { progress: &progress, limit: u64::MAX, settled: 0 };
+        let (routes, _) = g.routes_through(&query, &mut SearchWorkspace::new(), &mut budget, &mut |_| {}).unwrap();
+        let limit = routes.first().map_or(0.0, |r| r.cost) * factor as f32 / ROUNDING;
+        for route in &routes {
+            prop_assert!(same_cost(cost_of_steps(&g, route), route.cost));
+            prop_assert!(departures.iter().all(|d| route.states.iter().any(|s| d.contains(s))));
+        }
+        for _ in 0..departures.len() {
+            for (&x, cost) in departures[0].iter().zip(cheapest_rounds(&g, &mask, &departures)) {
+                let found = |r: &Route| r.states.contains(&x) && same_cost(r.cost, cost);
+                prop_assert!(cost > limit || routes.iter().any(found), "{x}: {cost} up to {limit}");
+            }
+            departures.rotate_left(1);
+        }
+    }
+}
+
 /// An anchor: the number of its vertex, and a direction.
 type Choice = (usize, Option<[f64; 3]>);
+
+fn at_vertices(g: &ElasticaGraph, anchors: &[Choice]) -> Vec<Anchor> {
+    let vertex = |i: usize| VertexId::new(i % g.mesh().n_vertices());
+    anchors.iter().map(|&(i, d)| Anchor { vertex: vertex(i), direction: d.map(DVec3::from_array) }).collect()
+}
+
+/// The states by which a loop may leave each anchor.
+fn departures(g: &ElasticaGraph, mask: &DirectionMask, anchors: &[Anchor]) -> Vec<Vec<State>> {
+    let of = |a: &Anchor| match a.direction {
+        Some(d) => g.nearest_open(mask, a.vertex, d).into_iter().collect(),
+        None => g.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
+    };
+    anchors.iter().map(of).collect()
+}
 
 /// The cost of the loop found through anchors on an uneven torus, and that of the cheapest by plain Dijkstra.
 fn anchored_costs([n, m]: [u32; 2], heights: &[f64], closed: &[(usize, f64)], anchors: &[Choice]) -> (f32, f32) {
     let g = uneven_graph(n, m, true, heights);
     let mask = close_some(&g, closed);
-    let vertex = |i: usize| VertexId::new(i % g.mesh().n_vertices());
-    let anchors: Vec<Anchor> =
-        anchors.iter().map(|&(i, d)| Anchor { vertex: vertex(i), direction: d.map(DVec3::from_array) }).collect();
-    let departures: Vec<Vec<State>> = anchors
-        .iter()
-        .map(|a| match a.direction {
-            Some(d) => g.nearest_open(&mask, a.vertex, d).into_iter().collect(),
-            None => g.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
-        })
-        .collect();
+    let anchors = at_vertices(&g, anchors);
+    let departures = departures(&g, &mask, &anchors);
     let reachable = departures.iter().all(|d| !d.is_empty());
     let expected = if reachable { cheapest_round(&g, &mask, &departures) } else { f32::INFINITY };
-    let query = AnchorQuery { anchors: &anchors, mask: &mask, budget: u64::MAX };
+    let query = AnchorQuery { budget: u64::MAX, ..AnchorQuery::cheapest(&anchors, &mask) };
     let progress = Progress::new();
     let mut budget = SearchBudget { progress: &progress, limit: u64::MAX, settled: 0 };
-    let (route, proved) = g.route_through(&query, &mut SearchWorkspace::new(), &mut budget).unwrap();
-    let cost = route.as_ref().map_or(f32::INFINITY, |r| r.cost);
+    let (routes, proved) = g.routes_through(&query, &mut SearchWorkspace::new(), &mut budget, &mut |_| {}).unwrap();
+    let cost = routes.first().map_or(f32::INFINITY, |r| r.cost);
     assert!(proved);
     (cost, expected)
 }

@@ -130,9 +130,13 @@ pub(super) fn compare_open_curves(g: &ElasticaGraph, mask: &DirectionMask, v: Ve
     best
 }
 
-/// The cost of the cheapest round through anchors, by the graph of distances of the thesis: the loop leaves anchor `i` by
-/// one of `departures[i]`.
+/// The cost of the cheapest round through anchors: the loop leaves anchor `i` by one of `departures[i]`.
 pub(super) fn cheapest_round(graph: &ElasticaGraph, mask: &DirectionMask, departures: &[Vec<State>]) -> f32 {
+    cheapest_rounds(graph, mask, departures).into_iter().fold(f32::INFINITY, f32::min)
+}
+
+/// The same for each of `departures[0]`, by the graph of distances of the thesis.
+pub(super) fn cheapest_rounds(graph: &ElasticaGraph, mask: &DirectionMask, departures: &[Vec<State>]) -> Vec<f32> {
     let n = departures.len();
     let table: Vec<Vec<Vec<f32>>> = (0..n)
         .map(|i| {
@@ -144,15 +148,14 @@ pub(super) fn cheapest_round(graph: &ElasticaGraph, mask: &DirectionMask, depart
             departures[i].iter().map(row).collect()
         })
         .collect();
-    let mut best = f32::INFINITY;
-    for x in 0..departures[0].len() {
+    let round = |x: usize| {
         let mut cost = vec![f32::INFINITY; departures[0].len()];
         cost[x] = 0.0;
         for leg in &table {
             let to = leg[0].len();
             cost = (0..to).map(|b| (0..leg.len()).map(|a| cost[a] + leg[a][b]).fold(f32::INFINITY, f32::min)).collect();
         }
-        best = best.min(cost[x]);
-    }
-    best
+        cost[x]
+    };
+    (0..departures[0].len()).map(round).collect()
 }

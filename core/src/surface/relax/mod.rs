@@ -21,5 +21,5 @@ mod triangle_strip;
 mod tube;
 mod vertex_passing;
 
-pub use options::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed};
+pub use options::{Alignment, CurveCost, RelaxError, RelaxOptions, Relaxed, Waypoint};
 pub use relaxation::{curve_cost, relax};

@@ -27,7 +27,7 @@ pub struct RelaxOptions<'a> {
     /// Crossings stay in `[t_min, 1 − t_min]` of their edges; between 0 and 0.5.
     pub t_min: f64,
     /// Points that the curve passes at a distance of at most a fraction of an edge.
-    pub waypoints: Vec<SurfacePoint>,
+    pub waypoints: Vec<Waypoint>,
     /// Most rounds of sliding and passing over vertices.
     pub rounds: usize,
     /// Most rounds in which the vertices that still block the curve are tried one by one. 0 takes about half the time
@@ -48,6 +48,22 @@ impl Default for RelaxOptions<'_> {
             rounds: 8,
             trials: 10,
         }
+    }
+}
+
+/// A point that a relaxed curve passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint {
+    /// The point.
+    pub at: SurfacePoint,
+    /// The direction of the curve there, of any length; `None`: that of the original curve. The distance of the curve from
+    /// the point is measured across it. The curve need not follow it at this point alone.
+    pub direction: Option<DVec3>,
+}
+
+impl From<SurfacePoint> for Waypoint {
+    fn from(at: SurfacePoint) -> Self {
+        Self { at, direction: None }
     }
 }
 

@@ -91,7 +91,7 @@ fn a_curve_passes_its_waypoints() {
         let face = mesh.face(curve.crossings[i].halfedge);
         let at = SurfacePoint { face, weights: [0.05, 0.05, 0.9] };
         let p = at.position(&mesh);
-        let guided = relaxed(&mesh, &curve, &RelaxOptions { waypoints: vec![at], ..RelaxOptions::default() });
+        let guided = relaxed(&mesh, &curve, &RelaxOptions { waypoints: vec![at.into()], ..RelaxOptions::default() });
         let (before, after) = (distance(&free.curve, p), distance(&guided.curve, p));
         assert!(after < 0.5 * before, "{before} {after}");
         assert!(guided.after.total < 1.2 * free.after.total, "{} {}", guided.after.total, free.after.total);

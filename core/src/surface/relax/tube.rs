@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::energy::Energy;
-use super::options::RelaxOptions;
+use super::options::{RelaxOptions, Waypoint};
 use super::triangle_strip::TriangleStrip;
 use crate::mesh::TriMesh;
 use crate::surface::vertex_fan::Side;
@@ -13,6 +13,9 @@ use crate::surface::vertex_fan::Side;
 /// thousand; this weight is far larger, so the curve nearly passes the point. It is far smaller than the cost of a kink
 /// at a single edge.
 const WAYPOINT_WEIGHT: f64 = 2e4;
+/// The same for waypoints with a direction, which hold the curve a few edges apart. A curve clamped at an angle to where it
+/// tends resists with a stiffness of `12 / h³` at distance `h`, about `10⁶` for the edges of ordinary meshes.
+const DIRECTED_WAYPOINT_WEIGHT: f64 = 1e6;
 /// How far along the original curve, in segments, the nearest segment is searched around the last one.
 const SEARCH_REACH: usize = 8;
 
@@ -24,6 +27,16 @@ struct Foot {
     segment: usize,
 }
 
+/// A waypoint in space.
+#[derive(Debug, Clone, Copy)]
+struct PlacedWaypoint {
+    point: DVec3,
+    /// Unit vector along the curve; zero: that of the original curve.
+    direction: DVec3,
+    /// The nearest crossing of the original curve.
+    reference: usize,
+}
+
 /// The original curve with a tube around it.
 pub(super) struct Tube<'a> {
     pub mesh: &'a TriMesh,
@@ -31,8 +44,7 @@ pub(super) struct Tube<'a> {
     /// Crossings of the original curve.
     points: Vec<DVec3>,
     closed: bool,
-    /// Waypoints, each with the nearest crossing of the original curve.
-    waypoints: Vec<(DVec3, usize)>,
+    waypoints: Vec<PlacedWaypoint>,
     radius: f64,
 }
 
@@ -45,7 +57,11 @@ impl<'a> Tube<'a> {
             let distance = |i: &usize| points[*i].distance_squared(p);
             (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
         };
-        let waypoints = options.waypoints.iter().map(|at| at.position(mesh)).map(|p| (p, nearest(p))).collect();
+        let place = |w: &Waypoint| {
+            let (point, direction) = (w.at.position(mesh), w.direction.unwrap_or(DVec3::ZERO).normalize_or_zero());
+            PlacedWaypoint { point, direction, reference: nearest(point) }
+        };
+        let waypoints = options.waypoints.iter().map(place).collect();
         let radius = options.tube * edges / strip.len() as f64;
         Self { mesh, options, points, closed: strip.closed, waypoints, radius }
     }
@@ -123,16 +139,17 @@ impl<'a> Tube<'a> {
             fidelity.push(across.map(|x| weight * x));
             bounds.push(if crossing.fixed { (crossing.t, crossing.t) } else { self.bounds(away, crossing.t) });
         }
-        for &(p, reference) in &self.waypoints {
-            self.add_waypoint(strip, (p, reference), &mut fidelity);
+        for &waypoint in &self.waypoints {
+            self.add_waypoint(strip, waypoint, &mut fidelity);
         }
         Energy::new(mesh, self.options, strip, fidelity, bounds)
     }
 
     /// Adds the squared distance from a waypoint, across the curve, to the fidelity of the crossing nearest to it. Does
     /// nothing if the strip is a window that does not contain that part of the curve.
-    fn add_waypoint(&self, strip: &TriangleStrip, (p, reference): (DVec3, usize), fidelity: &mut [[f64; 3]]) {
+    fn add_waypoint(&self, strip: &TriangleStrip, waypoint: PlacedWaypoint, fidelity: &mut [[f64; 3]]) {
         let mesh = self.mesh;
+        let PlacedWaypoint { point: p, direction, reference } = waypoint;
         let around = |i: &usize| {
             let apart = strip.crossings[*i].reference.abs_diff(reference);
             apart.min(self.points.len() - apart) <= SEARCH_REACH
@@ -142,10 +159,14 @@ impl<'a> Tube<'a> {
             return;
         };
         let j = strip.crossings[i].reference;
-        let tangent = (self.points[(j + 1) % self.points.len()] - self.points[j]).normalize_or_zero();
+        let along = (self.points[(j + 1) % self.points.len()] - self.points[j]).normalize_or_zero();
+        let (tangent, weight) = match direction {
+            DVec3::ZERO => (along, WAYPOINT_WEIGHT),
+            _ => (direction, DIRECTED_WAYPOINT_WEIGHT),
+        };
         let [right, left] = [Side::Right, Side::Left].map(|s| mesh.position(strip.end(mesh, i, s)));
         let square = square(orthogonal(right - p, tangent), orthogonal(left - right, tangent));
-        let weight = WAYPOINT_WEIGHT * self.options.beta;
+        let weight = weight * self.options.beta;
         fidelity[i].iter_mut().zip(square).for_each(|(f, s)| *f += weight * s);
     }
 

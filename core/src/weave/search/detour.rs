@@ -65,7 +65,7 @@ pub(in crate::weave) fn detours(arrangement: &Arrangement, base: &TriMesh, root:
     let curves = list.into_iter().filter_map(|(length, closing)| {
         let walk = tree.walk(arrangement, closing);
         let curve = on_base(arrangement, base, &walk, matches!(closing, Closing::Loop(_)))?;
-        Some(Proposal { curve, cost: COST_PER_LENGTH * length, energy: None })
+        Some(Proposal { curve, cost: COST_PER_LENGTH * length, energy: None, anchors: Vec::new() })
     });
     curves.take(max).collect()
 }

@@ -173,6 +173,6 @@ impl Session {
             Some(proxy) => Some(proxy.curve_to_proxy(mesh, &curve).ok()?),
         };
         let Proposal { cost, energy, .. } = *tried;
-        Some(Strip { id, curve, on_proxy, cost, energy, visible: true })
+        Some(Strip { id, curve, on_proxy, cost, energy, visible: true, anchors: tried.anchors.clone() })
     }
 }

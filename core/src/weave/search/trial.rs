@@ -102,7 +102,12 @@ impl Trial {
     pub(in crate::weave) fn new(session: &Session, design: &Design, progress: &Progress) -> Result<Self, WeaveError> {
         let model = Arc::clone(session.model());
         let tried = |(here, own): (&Strip, &Strip)| TrialStrip {
-            proposal: Proposal { curve: here.woven().clone(), cost: own.cost, energy: own.energy },
+            proposal: Proposal {
+                curve: here.woven().clone(),
+                cost: own.cost,
+                energy: own.energy,
+                anchors: own.anchors.clone(),
+            },
             placed: Some(own.clone()),
         };
         let strips: Vec<TrialStrip> = session.design().strips.iter().zip(&design.strips).map(tried).collect();

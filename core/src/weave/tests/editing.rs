@@ -79,7 +79,10 @@ impl Checked {
         match edit {
             Edit::Row(_) | Edit::Column(_) | Edit::Diagonal => {
                 let Some((kind, curve)) = self.curve(edit) else { return };
-                let id = self.session.place(Proposal { curve, cost: 1.0, energy: None }, &progress).unwrap();
+                let id = self
+                    .session
+                    .place(Proposal { curve, cost: 1.0, energy: None, anchors: Vec::new() }, &progress)
+                    .unwrap();
                 assert_eq!(id, StripId(self.placed), "numbers are not reused");
                 self.placed += 1;
                 self.change(|strips| strips.push((id, kind)));

@@ -14,7 +14,7 @@ const ROUNDS: usize = 6;
 fn with_strips(mesh: TriMesh, curves: impl IntoIterator<Item = SurfaceCurve>) -> Session {
     let mut s = session(mesh);
     for curve in curves {
-        s.place(Proposal { curve, cost: 1.0, energy: None }, &Progress::new()).unwrap();
+        s.place(Proposal { curve, cost: 1.0, energy: None, anchors: Vec::new() }, &Progress::new()).unwrap();
     }
     s
 }

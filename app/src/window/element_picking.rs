@@ -9,7 +9,7 @@ use crate::engine::{LayoutPart, LayoutPreview};
 const NODE_RADIUS: f32 = 8.0;
 /// Pick radius of an arc, in points. It is smaller, since strips are placed between arcs.
 const ARC_RADIUS: f32 = 4.0;
-/// Depth behind the surface up to which a point counts as visible, as a fraction of the bounding-box diagonal. Nodes
+/// Depth behind the surface up to which a point counts as visible, as a fraction of the model size. Nodes
 /// and arcs may lie a little below the triangles.
 const DEPTH_TOLERANCE: f32 = 0.01;
 

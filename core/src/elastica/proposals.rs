@@ -69,7 +69,7 @@ pub struct ProposalQuery<'a> {
 
 impl<'a> ProposalQuery<'a> {
     /// The cheapest loop through a vertex, in any direction. The budget, about a second, suffices for a proof on ordinary
-    /// meshes. The separation of 0.05, on a surface of diagonal 1, only matters for alternatives.
+    /// meshes. The separation of 0.05, on a surface of model size 1, only matters for alternatives.
     pub fn cheapest(vertex: VertexId, mask: &'a DirectionMask) -> Self {
         Self {
             vertex,
@@ -95,9 +95,9 @@ impl<'a> ProposalQuery<'a> {
 pub struct FoundLoop {
     /// The curve on the mesh of the graph.
     pub curve: SurfaceCurve,
-    /// Elastica cost, the sum of the following three terms; a length, on a surface of diagonal 1.
+    /// Elastica cost, the sum of the following three terms; a length, on a surface of model size 1.
     pub cost: f64,
-    /// Length of the geodesics, with rounded corners as in (8.2); on a surface of diagonal 1.
+    /// Length of the geodesics, with rounded corners as in (8.2); on a surface of model size 1.
     pub length: f64,
     /// Weighted alignment cost.
     pub alignment: f64,

@@ -16,7 +16,7 @@ pub type Alignment<'a> = dyn Fn(FaceId, DVec3) -> f64 + Sync + 'a;
 pub struct RelaxOptions<'a> {
     /// Weight `α` of the alignment in (8.1); 1 in the thesis.
     pub alpha: f64,
-    /// Weight `β` of the squared curvature in (8.1); 0.25 in the thesis, for models of bounding-box diagonal 1.
+    /// Weight `β` of the squared curvature in (8.1); 0.25 in the thesis, for models of size 1.
     pub beta: f64,
     /// The alignment `q`; `None` for 0.
     pub alignment: Option<&'a Alignment<'a>>,

@@ -9,7 +9,7 @@ use crate::mesh::TriMesh;
 use crate::surface::vertex_fan::Side;
 
 /// Weight of the squared distance from a waypoint, relative to that of bending. A curve displaced at one point deforms
-/// over a length `λ` of about half a bounding-box diagonal and resists with a stiffness of `192 / λ³`, about a
+/// over a length `λ` of about half a model size and resists with a stiffness of `192 / λ³`, about a
 /// thousand; this weight is far larger, so the curve nearly passes the point. It is far smaller than the cost of a kink
 /// at a single edge.
 const WAYPOINT_WEIGHT: f64 = 2e4;

@@ -28,6 +28,10 @@ pub struct Options {
     pub smoothing: f64,
 }
 
+/// [`RelaxOptions::tie`](crate::surface::RelaxOptions::tie) of new designs: far above the rounding of files of seven digits, far
+/// below what matters for a curve.
+const RELAXATION_TIE: f64 = 1e-5;
+
 /// Number of triangles of a proxy. `docs/decisions.md` has the measurements.
 const PROXY: u32 = 30_000;
 
@@ -40,6 +44,14 @@ fn is_zero(x: &f64) -> bool {
 }
 
 impl Options {
+    /// See [`RelaxOptions::tie`](crate::surface::RelaxOptions::tie). Designs of before keep the curves that rounding decided.
+    pub(in crate::weave) fn relaxation_tie(&self) -> f64 {
+        match self.normalised_by {
+            NormalisedBy::BoundingBox => 0.0,
+            NormalisedBy::Surface => RELAXATION_TIE,
+        }
+    }
+
     /// The options of a file that names none. They differ from those of a new design where files of before would change.
     pub fn unnamed() -> Self {
         Self { normalised_by: NormalisedBy::unnamed(), ..Self::default() }

@@ -152,7 +152,8 @@ impl Session {
         let vertex = at.nearest_vertex(&self.model.mesh);
         let placed = self.design.strips.iter().map(Strip::woven);
         let contacts = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
-        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &contacts, l, at, progress);
+        let tie = self.model.options.relaxation_tie();
+        let smoothed_proposal = |l: &FoundLoop| smoothed_proposal(graph, &contacts, l, at, tie, progress);
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;
         let mut watch = |certainty: Certainty, l: &FoundLoop| match certainty {
             Certainty::Found => first(Proposal::found(l)),

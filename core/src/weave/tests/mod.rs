@@ -2,6 +2,7 @@
 
 mod editing;
 mod improving;
+mod turning;
 
 use std::path::Path;
 

@@ -5,6 +5,7 @@ mod support;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use plait_core::weave::Design;
 use serde_json::Value;
 use support::replay::{replayed, report, script};
 use support::{errors, plait, plait_with, text};

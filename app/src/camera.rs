@@ -1,7 +1,7 @@
 //! The camera: a turntable around a target, with pan, zoom toward a point, and framing.
 //!
 //! World space is right-handed. The axis of the turntable is world y, or z with [`Camera::z_up`]. Angles are in
-//! radians, lengths in world units (models have a bounding-box diagonal of 1), screen positions in points from the top
+//! radians, lengths in world units (models have size 1), screen positions in points from the top
 //! left corner.
 
 use glam::{Mat4, Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};

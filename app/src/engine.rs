@@ -238,7 +238,7 @@ pub struct Scene {
     pub can_redo: bool,
 }
 
-/// The scale of the features that strips follow. Both lengths are fractions of the bounding-box diagonal.
+/// The scale of the features that strips follow. Both lengths are fractions of the model size.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Detail {
     /// Radius of the ball over which curvature is estimated.

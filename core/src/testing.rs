@@ -29,7 +29,7 @@ pub(crate) fn research_meshes() -> Option<PathBuf> {
     None
 }
 
-/// A research mesh as it is loaded, of bounding-box diagonal 1; where it is missing, [`skip`].
+/// A research mesh as it is loaded, normalised by its bounding box; where it is missing, [`skip`].
 pub(crate) fn research_mesh(file: &str) -> Option<LoadedMesh> {
     let path = research_meshes()?.join(file);
     if path.is_file() {

@@ -4,7 +4,7 @@ use plait_core::strip::{StripCoverage, StripMap};
 
 use crate::engine::Stripes;
 
-/// Distance of two lines, as a fraction of the bounding-box diagonal: dense enough for a texture, sparse enough to
+/// Distance of two lines, as a fraction of the model size: dense enough for a texture, sparse enough to
 /// follow a line. Chosen by hand.
 const SPACING: f64 = 0.012;
 /// Most lines on one side of a strip; the renderer stores their number in a byte.

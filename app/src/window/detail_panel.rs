@@ -8,12 +8,12 @@ use super::theme;
 use super::widgets::wide_button;
 use crate::engine::{Detail, Scene};
 
-/// Range of the smoothing radius, in percent of the bounding-box diagonal. More leaves little of any shape.
+/// Range of the smoothing radius, in percent of the model size. More leaves little of any shape.
 const SMOOTHING: std::ops::RangeInclusive<f64> = 0.0..=5.0;
-/// Range of the curvature radius, in percent of the bounding-box diagonal. With less, curvature is that of single
+/// Range of the curvature radius, in percent of the model size. With less, curvature is that of single
 /// triangles; more leaves little of any shape.
 const CURVATURE_RADIUS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
-/// Difference below which two values are equal, as a fraction of the bounding-box diagonal: less than a slider shows.
+/// Difference below which two values are equal, as a fraction of the model size: less than a slider shows.
 const TOLERANCE: f64 = 1e-4;
 
 /// Shows the sliders and the button that applies them, collapsed at first since most models need no change.
@@ -30,13 +30,13 @@ pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action
                 *value = 0.01 * percent;
             }
         };
-        let hint = "Radius of curvature estimation, in percent of the bounding-box diagonal. \
+        let hint = "Radius of curvature estimation, in percent of the model size. \
                     Strips follow the principal directions at this scale.";
         slider(ui, "Curvature radius", &mut chosen.curvature_radius, CURVATURE_RADIUS, hint);
-        let hint = "Smoothing radius of the surface that is woven on, in percent of the bounding-box diagonal. \
+        let hint = "Smoothing radius of the surface that is woven on, in percent of the model size. \
                     Strips ignore smaller features. The layout still lies on the original surface.";
         slider(ui, "Smoothing radius", &mut chosen.smoothing, SMOOTHING, hint);
-        ui.label(RichText::new("in % of the bounding-box diagonal").size(13.0).color(theme::QUIET));
+        ui.label(RichText::new("in % of the model size").size(13.0).color(theme::QUIET));
         let changed = differs(chosen, scene.detail);
         if Some(chosen) != app.detail {
             actions.push(Action::ChooseDetail(chosen));

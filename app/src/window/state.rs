@@ -22,7 +22,7 @@ use crate::worker::{Running, StoppableWork, Worker};
 
 /// Work that takes longer shows a progress bar.
 const PROGRESS_DELAY: Duration = Duration::from_millis(500);
-/// Depth behind the surface up to which a point counts as visible, on a surface of diagonal 1. Nodes, arcs and spines may lie
+/// Depth behind the surface up to which a point counts as visible, as a fraction of the model size. Nodes, arcs and spines may lie
 /// a little below the triangles.
 const DEPTH_TOLERANCE: f32 = 0.01;
 /// Default target number of quads of an export.

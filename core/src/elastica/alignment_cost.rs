@@ -14,7 +14,7 @@ use crate::mesh::{EdgeId, TriMesh, VertexId};
 use crate::surface::PrincipalCurvature;
 
 /// Upper bound of the alignment cost of a geodesic per unit length, so that sums stay finite where triangles are
-/// degenerate. Ordinary surfaces of diagonal 1 stay below 2000.
+/// degenerate. Ordinary surfaces of model size 1 stay below 2000.
 const MAX_ALIGNMENT: f64 = 1e6;
 
 /// The alignment cost on a mesh.

@@ -15,7 +15,7 @@ use super::graph::State;
 /// processor's first caches.
 const BUCKET_BITS: u32 = 7;
 
-/// Keys up to this share the first bucket. A step on a surface of diagonal 1 costs more.
+/// Keys up to this share the first bucket. A step on a surface of model size 1 costs more.
 const LEAST_KEY: f32 = 1.0 / 1024.0;
 
 /// States with non-negative keys. The smallest key is popped first; of equal keys, the smallest state.

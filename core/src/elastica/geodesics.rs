@@ -21,7 +21,7 @@ const MAX_GEODESICS: usize = 250;
 const MAX_RING: usize = 1000;
 
 /// Lower bound of the length of a geodesic, so that the bending cost, which divides by it, stays finite. Chosen by hand;
-/// the surface has diagonal 1.
+/// the surface has model size 1.
 const MIN_LENGTH: f64 = 1e-9;
 
 /// Number of vertices that one parallel task handles; chosen by hand.
@@ -34,7 +34,7 @@ pub(super) struct Geodesic {
     pub(super) ends: [u32; 2],
     /// Tangent angles at which it leaves each end, in radians.
     pub(super) angles: [f32; 2],
-    /// Length, on a surface of diagonal 1.
+    /// Length, on a surface of model size 1.
     pub(super) length: f32,
     /// Alignment cost per unit length.
     pub(super) alignment: f32,

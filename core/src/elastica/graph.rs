@@ -30,7 +30,7 @@ pub(super) struct DirectedGeodesic {
     pub(super) out_angle: f32,
     /// Tangent angle of its reverse at its target, in radians.
     pub(super) back_angle: f32,
-    /// Length, on a surface of diagonal 1.
+    /// Length, on a surface of model size 1.
     pub(super) length: f32,
     /// Alignment cost `q` per unit length.
     pub(super) alignment: f32,

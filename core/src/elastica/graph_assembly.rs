@@ -15,7 +15,7 @@ use crate::surface::PrincipalCurvature;
 
 impl ElasticaGraph {
     /// Joins the vertices of `mesh` by straight geodesics and weights them by `curvature` (per vertex) and `sharp` (per
-    /// edge). The mesh must be scaled to bounding-box diagonal 1.
+    /// edge). The mesh must be normalised.
     ///
     /// # Errors
     ///

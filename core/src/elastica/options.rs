@@ -14,7 +14,7 @@ pub struct ElasticaOptions {
     pub rings: usize,
     /// Weight α of alignment with the principal directions in (8.1). 0: no alignment.
     pub alpha: f64,
-    /// Weight β of the squared geodesic curvature in (8.1), for a surface of bounding-box diagonal 1. 0: turning costs
+    /// Weight β of the squared geodesic curvature in (8.1), for a surface of model size 1. 0: turning costs
     /// nothing.
     pub beta: f64,
     /// Largest turning angle between consecutive geodesics, in radians, from 0 to a right angle. The default is the 30°

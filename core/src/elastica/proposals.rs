@@ -56,7 +56,7 @@ pub struct Selection<'a> {
 }
 
 impl Selection<'_> {
-    /// The cheapest loop. The separation of 0.05, on a surface of diagonal 1, only matters for alternatives.
+    /// The cheapest loop. The separation of 0.05, on a surface of model size 1, only matters for alternatives.
     pub fn cheapest() -> Self {
         Self { factor: 1.0, max: 1, separation: 0.05, classes: None }
     }
@@ -104,9 +104,9 @@ impl<'a> ProposalQuery<'a> {
 pub struct FoundLoop {
     /// The curve on the mesh of the graph.
     pub curve: SurfaceCurve,
-    /// Elastica cost, the sum of the following three terms; a length, on a surface of diagonal 1.
+    /// Elastica cost, the sum of the following three terms; a length, on a surface of model size 1.
     pub cost: f64,
-    /// Length of the geodesics, with rounded corners as in (8.2); on a surface of diagonal 1.
+    /// Length of the geodesics, with rounded corners as in (8.2); on a surface of model size 1.
     pub length: f64,
     /// Weighted alignment cost.
     pub alignment: f64,

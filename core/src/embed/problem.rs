@@ -8,7 +8,7 @@ use crate::surface::{PrincipalCurvature, SurfaceIndex};
 /// The surface a layout is embedded on.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface<'a> {
-    /// Its mesh, scaled to a bounding-box diagonal of 1.
+    /// Its mesh, normalised.
     pub mesh: &'a TriMesh,
     /// Spatial index of the mesh, for nearest points.
     pub index: &'a SurfaceIndex,
@@ -31,7 +31,7 @@ pub struct Settings {
     pub sizing: bool,
     /// Least length of an arc in the map, as a multiple of the mean edge length of the mesh.
     pub spacing: f64,
-    /// Length in the map below which chords are collapsed, on a surface of bounding-box diagonal 1; `None`: no chord
+    /// Length in the map below which chords are collapsed, on a surface of model size 1; `None`: no chord
     /// is, and short ones keep the least length.
     pub collapse: Option<f64>,
     /// Whether chords are collapsed one by one as long as that makes the layout less irregular without raising the

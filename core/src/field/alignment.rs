@@ -25,14 +25,14 @@ const INJECTIVE_STRENGTH: f64 = 3.5;
 /// Total length of features, in square roots of the surface's area, above which [`STRENGTH`] serves for locally injective
 /// maps too: with more, features could not be made constraints (on the fan disk at 2.6 none).
 const FEATURE_DOMINATED: f64 = 4.0;
-/// Largest `κ₁ − κ₂` that counts, in inverse bounding-box diagonals. Curvature is averaged over balls of radius 0.03, so no
+/// Largest `κ₁ − κ₂` that counts, in inverse model sizes. Curvature is averaged over balls of radius 0.03, so no
 /// bend is seen sharper; larger values stem from slivers and creases.
 const MAX_DIFFERENCE: f64 = 40.0;
 /// Anisotropy `(κ₁ − κ₂) / (|κ₁| + |κ₂|)` (0 on spheres, 1 on cylinders and saddles) up to which there is no penalty, and
-/// from which on it is full. On a sphere of 4000 points with noise of up to a thousandth of the diagonal nine tenths of
+/// from which on it is full. On a sphere of 4000 points with noise of up to a thousandth of the model size nine tenths of
 /// the triangles have less than 0.18.
 const ANISOTROPY: [f64; 2] = [0.2, 0.6];
-/// Least weight of a penalty, in inverse squared bounding-box diagonals: below, the direction prevails in no part of the
+/// Least weight of a penalty, in inverse squared model sizes: below, the direction prevails in no part of the
 /// surface.
 const MIN_WEIGHT: f64 = 1.0;
 

@@ -17,7 +17,7 @@ use crate::mesh::{EdgeId, TriMesh};
 use crate::solve::{SolveError, SparseHermitian, SpdFactor, SpdSymbolic};
 use crate::surface::Metric;
 
-/// Length ℓ over which φ decays to 0, in bounding-box diagonals. In maps along guiding fields sizing lowers the residual from
+/// Length ℓ over which φ decays to 0, in model sizes. In maps along guiding fields sizing lowers the residual from
 /// 0.073 to 0.023 (Fertility), 0.147 to 0.025 (elephant), 0.124 to 0.070 (rocker arm), 0.070 to 0.035 (fan disk) and 0.101
 /// to 0.077 (bunny), within 8 percent of the values without decay; with ℓ = 0.2 the elephant keeps 0.054.
 const DECAY_LENGTH: f64 = 1.0;

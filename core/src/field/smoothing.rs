@@ -27,7 +27,7 @@ const AREA_RATIO: [f64; 2] = [1e-3, 1e3];
 /// Inverse iterations for components without constraints. Few suffice: eigenvectors not separated by then belong to nearly
 /// equal eigenvalues, hence are nearly as smooth.
 const ITERATIONS: usize = 8;
-/// Length over which a diffusion step smooths, in bounding-box diagonals (the mesh is normalised): pairs of singularities
+/// Length over which a diffusion step smooths, in model sizes (the mesh is normalised): pairs of singularities
 /// closer than about this cancel, details of the field of this size remain.
 const DIFFUSION_LENGTH: f64 = 0.1;
 /// Number of diffusion steps.

@@ -14,17 +14,17 @@ use super::traversal::BreadthFirst;
 /// sides and the 45° of a chamfer, the flattest crease common in machine parts.
 pub const SHARP_DIHEDRAL: f64 = 40.0 * std::f64::consts::PI / 180.0;
 
-/// Default least length of features for [`drop_short_features`], in bounding-box diagonals. Of the models tried, machine
+/// Default least length of features for [`drop_short_features`], in model sizes. Of the models tried, machine
 /// parts keep all their creases at this value; animals and statues lose nearly all edges sharper than 40°, which there are
 /// noise and coarse tessellation. Zero keeps all sharp edges.
 pub const SHORT_FEATURE: f64 = 0.2;
 
-/// Least height of a face whose own normal is used, in bounding-box diagonals. Files mostly hold six or seven digits:
+/// Least height of a face whose own normal is used, in model sizes. Files mostly hold six or seven digits:
 /// positions are off by up to 1e-6, and at this height the normal by up to 3°.
 const MIN_HEIGHT: f64 = 2e-5;
 
 /// For each edge, whether the normals of its faces differ by more than `dihedral` radians. Boundary edges are not sharp.
-/// The mesh must be normalised to bounding-box diagonal 1.
+/// The mesh must be normalised.
 pub fn sharp_edges(mesh: &TriMesh, dihedral: f64) -> Vec<bool> {
     let normals = robust_normals(mesh);
     let is_sharp = |h| {
@@ -65,7 +65,7 @@ fn support(mesh: &TriMesh, f: FaceId) -> FaceId {
     if height >= MIN_HEIGHT { f } else { mesh.twin(sides[longest]).map_or(f, |t| mesh.face(t)) }
 }
 
-/// Unmarks every connected set of sharp edges whose total length is below `length` (in bounding-box diagonals): on scanned
+/// Unmarks every connected set of sharp edges whose total length is below `length` (in model sizes): on scanned
 /// and organic surfaces single edges are sharp by noise alone, while intended creases are long.
 pub fn drop_short_features(mesh: &TriMesh, sharp: &mut [bool], length: f64) {
     let mut search: BreadthFirst<EdgeId, ()> = BreadthFirst::new(mesh.n_edges());

@@ -303,6 +303,11 @@ impl TriMesh {
         self.positions[v.index()] = position;
     }
 
+    /// The same triangles, with every vertex moved by `map`.
+    pub(crate) fn mapped(&self, map: impl Fn(DVec3) -> DVec3) -> Self {
+        Self { positions: self.positions.iter().map(|&p| map(p)).collect(), ..self.clone() }
+    }
+
     /// The vector along a half-edge.
     #[inline]
     pub fn vector(&self, h: HalfedgeId) -> DVec3 {

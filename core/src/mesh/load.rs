@@ -1,6 +1,6 @@
 //! Loading a mesh file: read, triangulate, repair, normalise.
 //!
-//! The result is an oriented manifold (checked by [`TriMesh::from_faces`]), centred and scaled to bounding-box diagonal 1,
+//! The result is an oriented manifold (checked by [`TriMesh::from_faces`]), normalised by its bounding box,
 //! so that every tolerance of the library has one meaning. Repairs are listed. What cannot be repaired with certainty is
 //! an error that names its place in the file.
 
@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::error::LoadError;
 use super::kernel::TriMesh;
-use super::normalisation::Normalisation;
+use super::normalisation::{Normalisation, NormalisedBy};
 use super::read;
 use super::repair::{Repair, repair};
 use super::triangulate::triangulate;
@@ -18,7 +18,7 @@ use crate::progress::Progress;
 /// A mesh read from a file.
 #[derive(Debug, Clone)]
 pub struct LoadedMesh {
-    /// The mesh, centred at the origin and of bounding-box diagonal 1.
+    /// The mesh, centred at the origin and of model size 1.
     pub mesh: Arc<TriMesh>,
     /// The similarity that takes it back to the coordinates of the file.
     pub units: Normalisation,
@@ -26,6 +26,35 @@ pub struct LoadedMesh {
     pub repairs: Vec<Repair>,
     /// The file's name without folder and extension.
     pub name: String,
+}
+
+impl LoadedMesh {
+    /// The same mesh, normalised by another size. Unchanged if it is normalised so already, or has no area to be normalised
+    /// by.
+    #[must_use]
+    pub fn normalised_by(mut self, by: NormalisedBy) -> Self {
+        if self.units.by == by {
+            return self;
+        }
+        let step = match by {
+            NormalisedBy::BoundingBox => Normalisation::by_bounding_box(self.mesh.positions()),
+            NormalisedBy::Surface => Normalisation::by_surface(&self.mesh),
+        };
+        if let Some(step) = step {
+            self.mesh = Arc::new(self.mesh.mapped(|p| step.from_file(p)));
+            self.units =
+                Normalisation { by, centre: self.units.to_file(step.centre), scale: self.units.scale * step.scale };
+        }
+        self
+    }
+
+    /// Diagonal of the bounding box, in units of `mesh`.
+    pub fn diagonal(&self) -> f64 {
+        match self.units.by {
+            NormalisedBy::BoundingBox => 1.0,
+            NormalisedBy::Surface => Normalisation::by_bounding_box(self.mesh.positions()).map_or(1.0, |n| n.scale),
+        }
+    }
 }
 
 /// Loads a mesh file: OBJ, OFF, PLY or STL, recognised by its content.
@@ -63,7 +92,7 @@ pub fn parse_with(bytes: &[u8], name: &str, progress: &Progress) -> Result<Loade
     let triangles = triangulate(&raw)?;
     let (positions, faces, repairs) = repair(raw, triangles)?;
     progress.report("Connecting triangles", 0.8);
-    let units = Normalisation::of(&positions).ok_or(LoadError::NoSize)?;
+    let units = Normalisation::by_bounding_box(&positions).ok_or(LoadError::NoSize)?;
     let mesh = TriMesh::from_faces(positions.into_iter().map(|p| units.from_file(p)).collect(), &faces)?;
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     Ok(LoadedMesh { mesh: Arc::new(mesh), units, repairs, name: stem.to_owned() })
@@ -111,7 +140,7 @@ mod tests {
             } else {
                 assert!(matches!(loaded.repairs[0], Repair::SplitVertices { .. }), "{file}: {:?}", loaded.repairs);
             }
-            let again = Normalisation::of(loaded.mesh.positions()).unwrap();
+            let again = Normalisation::by_bounding_box(loaded.mesh.positions()).unwrap();
             assert!((again.scale - 1.0).abs() < 1e-12 && again.centre.length() < 1e-12);
         }
     }

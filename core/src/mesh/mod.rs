@@ -25,7 +25,7 @@ pub use features::{SHARP_DIHEDRAL, SHORT_FEATURE, drop_short_features, sharp_edg
 pub use ids::{EdgeId, FaceId, HalfedgeId, VertexId};
 pub use kernel::{TriMesh, TriMeshError};
 pub use load::{LoadedMesh, load, parse, parse_with};
-pub use normalisation::Normalisation;
+pub use normalisation::{Normalisation, NormalisedBy, SURFACE_SIZE};
 pub use repair::Repair;
 pub use source::{MeshSource, fingerprint};
 pub use subdivide::loop_subdivision;

@@ -16,11 +16,11 @@ use crate::surface::Metric;
 /// whose orientation is not reliable where isolines are constraints. Chosen by hand; 0 would stop it at all of them.
 const SLIVER: f64 = 0.05;
 
-/// Singularities of opposite index closer than this, in bounding-box diagonals, do not end a strip: isolines pass such a
+/// Singularities of opposite index closer than this, in model sizes, do not end a strip: isolines pass such a
 /// pair with a kink only. Chosen by hand.
 const PAIR_DISTANCE: f64 = 0.04;
 
-/// Singularities within this distance of a curve, in bounding-box diagonals, do not end its strip: it would be too narrow to
+/// Singularities within this distance of a curve, in model sizes, do not end its strip: it would be too narrow to
 /// be seen.
 const MIN_WIDTH: f64 = 0.015;
 

@@ -46,8 +46,9 @@ impl Session {
         let (graph, waypoints) = (&self.model().graph, self.waypoints(anchors));
         let others = self.design().strips.iter().filter(|s| Some(s.id) != replaces).map(Strip::woven);
         let contacts = LoopContacts::new(&self.model().mesh, &self.model().sharp, others);
+        let tie = self.model().options.relaxation_tie();
         let smooth = |l: &FoundLoop| {
-            let smooth = smoothed_proposal(graph, &contacts, l, &waypoints, progress)?;
+            let smooth = smoothed_proposal(graph, &contacts, l, &waypoints, tie, progress)?;
             Ok(Proposal { anchors: anchors.to_vec(), ..smooth })
         };
         found.par_iter().map(smooth).collect()

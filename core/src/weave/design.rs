@@ -58,7 +58,8 @@ impl Strip {
 }
 
 /// A part of the layout that keeps its position when the embedding is optimised. It is identified by a point of the initial
-/// embedding, which is the same for the same strips; coordinates are those of the normalised mesh.
+/// embedding, which is the same for the same strips; coordinates are those of the mesh
+/// normalised as the options say.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pin {

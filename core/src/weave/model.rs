@@ -64,12 +64,13 @@ pub(in crate::weave) struct DesignMeshData {
 }
 
 impl Model {
-    /// Prepares a mesh for weaving.
+    /// Prepares a mesh for weaving; it is normalised as the options say.
     ///
     /// # Errors
     ///
     /// [`WeaveError::Cancelled`], [`WeaveError::Elastica`] or [`WeaveError::Field`].
     pub fn prepare(loaded: LoadedMesh, options: Options, progress: &Progress) -> Result<Self, WeaveError> {
+        let loaded = loaded.normalised_by(options.normalised_by);
         progress.report("Finding features", 0.02);
         let topology = Topology::new(&loaded.mesh);
         let sharp = features(&loaded.mesh, &options);
@@ -146,13 +147,14 @@ pub(in crate::weave) fn features(mesh: &TriMesh, options: &Options) -> Vec<bool>
     sharp
 }
 
-/// Singularities of opposite index closer together than this, as a fraction of the diagonal, cancel as noise of the field.
+/// Singularities of opposite index closer together than this, as a fraction of the model size, cancel as noise of the
+/// field.
 const CORNER_RADIUS: f64 = 0.08;
 /// Distance over which a fully weighted principal direction outweighs smoothness of the field, as a fraction of the
-/// diagonal.
+/// model size.
 const ALIGNMENT_RADIUS: f64 = 0.15;
 /// Difference of the absolute principal curvatures from which on a principal direction has full weight, in inverse
-/// diagonals.
+/// model sizes.
 const FULL_ANISOTROPY: f64 = 10.0;
 
 /// The pronounced singularities of the curvature-aligned cross field.

@@ -42,7 +42,7 @@ impl OpenedLayout {
         progress.report("Reading the layout", 0.0);
         let mut file = LayoutFile::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let loaded = file.mesh.load(folder)?;
+        let loaded = file.mesh.load(folder)?.normalised_by(file.normalised_by);
         file.check_mesh(&loaded.mesh)?;
         if let MeshSource::File(mesh) = &mut file.mesh {
             let full = folder.join(&*mesh);
@@ -115,7 +115,9 @@ impl OpenedLayout {
         if let Ok(export) = &result {
             export.write(folder, &self.loaded.units)?;
             if export.has_collapsed() {
-                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, &export.initial.initial_embedding)?;
+                let (by, embedding) = (file.normalised_by, &export.initial.initial_embedding);
+                file = LayoutFile::from_embedding(file.mesh, mesh, &export.layout, embedding)?;
+                file.normalised_by = by;
             }
         }
         file.write(&folder.join("layout.layout"))?;

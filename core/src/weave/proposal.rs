@@ -49,17 +49,18 @@ impl Proposal {
 const TUBES: [f64; 3] = [2.5, 1.2, 0.6];
 
 /// A found loop relaxed to a smooth curve through the waypoints that crosses no feature and no placed strip more often than the loop
-/// does. If that fails in every tube, the loop as it was found.
+/// does. If that fails in every tube, the loop as it was found. `tie` as in [`RelaxOptions::tie`].
 pub(in crate::weave) fn smoothed_proposal(
     graph: &ElasticaGraph,
     contacts: &LoopContacts<'_>,
     found: &FoundLoop,
     waypoints: &[Waypoint],
+    tie: f64,
     progress: &Progress,
 ) -> Result<Proposal, WeaveError> {
     let before = contacts.count(&found.curve);
     for tube in TUBES {
-        let options = RelaxOptions { waypoints: waypoints.to_vec(), tube, ..Default::default() };
+        let options = RelaxOptions { waypoints: waypoints.to_vec(), tube, tie, ..Default::default() };
         match relax(graph.mesh(), &found.curve, &options, progress) {
             Ok(relaxed) if contacts.count(&relaxed.curve).at_most(&before) => {
                 return Ok(Proposal::found(found).relaxed(relaxed));

@@ -144,7 +144,7 @@ mod tests {
         let progress = Progress::new();
         let source = MeshSource::Builtin("torus".into());
         let mut session = Session::open(builtin("torus").unwrap(), source, Options::default(), &progress).unwrap();
-        let at = SurfacePoint { face: crate::mesh::FaceId(100), weights: [0.8, 0.1, 0.1] };
+        let at = SurfacePoint { face: crate::mesh::FaceId(200), weights: [0.8, 0.1, 0.1] };
         let mut handed = Vec::new();
         let first = session.proposals_with(at, &progress, |p| handed.push(p)).unwrap();
         assert!(handed.len() >= 2 && handed.last() == first.first());

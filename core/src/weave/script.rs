@@ -68,8 +68,8 @@ pub struct ScriptAnchor {
 pub struct Script {
     /// Name of a built-in model, or path of a mesh or of a design relative to the script.
     pub mesh: String,
-    /// The options; the default ones if left out. A design has its own.
-    #[serde(default)]
+    /// The options; if left out, [`Options::unnamed`]. A design has its own.
+    #[serde(default = "Options::unnamed")]
     pub options: Options,
     /// The steps in order.
     pub steps: Vec<Step>,

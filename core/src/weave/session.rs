@@ -52,16 +52,18 @@ impl Session {
         options: Options,
         progress: &Progress,
     ) -> Result<Self, WeaveError> {
+        let loaded = loaded.normalised_by(options.normalised_by);
         let design = Design::new(source, &loaded.mesh, options);
         Self::resume(loaded, design, progress)
     }
 
-    /// Prepares a mesh and continues a design on it.
+    /// Prepares a mesh, normalised as the design says, and continues the design on it.
     ///
     /// # Errors
     ///
     /// See [`Model::prepare`]; [`WeaveError::Design`] when the design was made on another mesh.
     pub fn resume(loaded: LoadedMesh, mut design: Design, progress: &Progress) -> Result<Self, WeaveError> {
+        let loaded = loaded.normalised_by(design.options.normalised_by);
         design.check_mesh(&loaded.mesh)?;
         let mut model = Model::prepare(loaded, design.options, progress)?;
         if !transfer_to_proxy(&model, &mut design)? {
@@ -77,13 +79,14 @@ impl Session {
         Ok(Self { model, design, woven, undo, redo, next_id, recent })
     }
 
-    /// The same design under other options. Strips keep their curves on the design mesh. The history is cut where its strips
-    /// have another arrangement on the new woven mesh.
+    /// The same design under other options. It stays normalised as it is, since its costs, energies and pins are. Strips keep
+    /// their curves on the design mesh. The history is cut where its strips have another arrangement on the new woven mesh.
     ///
     /// # Errors
     ///
     /// See [`Model::prepare`]; [`WeaveError::Options`] if the strips have another arrangement on the new woven mesh.
     pub fn with_options(&self, options: Options, progress: &Progress) -> Result<Self, WeaveError> {
+        let options = Options { normalised_by: self.design.options.normalised_by, ..options };
         let design = Design { options, ..self.design.clone() };
         let mut new = Self::resume(self.model.loaded.clone(), design, progress)?;
         if new.model.options != options {
@@ -151,8 +154,9 @@ impl Session {
         let vertex = at.nearest_vertex(&self.model.mesh);
         let placed = self.design.strips.iter().map(Strip::woven);
         let contacts = LoopContacts::new(&self.model.mesh, &self.model.sharp, placed);
+        let tie = self.model.options.relaxation_tie();
         let smoothed_proposal = |l: &FoundLoop| {
-            let smooth = smoothed_proposal(graph, &contacts, l, &[at.into()], progress)?;
+            let smooth = smoothed_proposal(graph, &contacts, l, &[at.into()], tie, progress)?;
             Ok(Proposal { anchors: vec![anchor], ..smooth })
         };
         let mut best: Option<(SurfaceCurve, Result<Proposal, WeaveError>)> = None;

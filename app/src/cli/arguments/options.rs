@@ -34,10 +34,10 @@ pub struct DetailArguments {
     /// Weave meshes with more than twice this many triangles on a proxy of this many triangles. 0: no proxy.
     #[arg(long, value_name = "TRIANGLES")]
     pub proxy: Option<u32>,
-    /// Radius of curvature estimation, as a fraction of the bounding-box diagonal.
+    /// Radius of curvature estimation, as a fraction of the model size.
     #[arg(long, value_name = "RADIUS", value_parser = parse_radius)]
     pub curvature_radius: Option<f64>,
-    /// Smoothing radius of the mesh that is woven on, as a fraction of the bounding-box diagonal. 0: no smoothing.
+    /// Smoothing radius of the mesh that is woven on, as a fraction of the model size. 0: no smoothing.
     #[arg(long, value_name = "RADIUS", value_parser = parse_radius)]
     pub smoothing: Option<f64>,
 }
@@ -54,7 +54,7 @@ impl DetailArguments {
     }
 }
 
-/// A fraction of the bounding-box diagonal; half of it is the radius of the whole model.
+/// A fraction of the model size; half of it is the radius of the whole model.
 fn parse_radius(text: &str) -> Result<f64, String> {
     let radius = text.parse::<f64>().ok().filter(|r| (0.0..=0.5).contains(r));
     radius.ok_or_else(|| "a radius is a number from 0 to 0.5".to_owned())

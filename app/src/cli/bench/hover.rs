@@ -32,7 +32,7 @@ const RELAXED_SHARE: &str = "the same, relaxed / found";
 
 /// Number of points of one stroke of the pointer.
 const STROKE: usize = 25;
-/// Distance between them, as a fraction of the bounding-box diagonal: a few pixels in the window.
+/// Distance between them, as a fraction of the model size: a few pixels in the window.
 const STEP: f64 = 0.004;
 
 /// Group of the rows in the report, for this number of placed strips.

@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::surface::{SurfaceCurve, principal_curvature};
 use crate::testing::{grid, research_mesh};
 
-/// Scales to bounding-box diagonal 1, as loading does.
+/// Normalises by the bounding box, as loading does.
 pub(super) fn normalised(points: Vec<DVec3>, faces: &[[u32; 3]]) -> TriMesh {
     let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -20,7 +20,7 @@ pub(super) fn normalised(points: Vec<DVec3>, faces: &[[u32; 3]]) -> TriMesh {
 }
 
 /// A grid of `n` by `m` quads, each cut in two, closed along the first direction, and along the second if `closed`; scaled
-/// to diagonal 1. Vertices are numbered along the second.
+/// to bounding-box diagonal 1. Vertices are numbered along the second.
 pub(super) fn around(n: u32, m: u32, closed: bool, point: impl Fn(f64, f64) -> DVec3) -> TriMesh {
     let mesh = grid(m, n, [closed, true], |v, u| point(u, v));
     let turned = |f| mesh.face_vertices(f).map(|v| v.0);

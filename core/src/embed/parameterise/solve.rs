@@ -31,7 +31,7 @@ const FULL_AGREEMENT: f64 = 0.15;
 /// cross.
 const NO_AGREEMENT: f64 = 0.35;
 /// Penalty weight of the directions of the initial embedding per area, in inverse squared lengths on a surface of
-/// bounding-box diagonal 1. They decide how the field as a whole is turned where nothing else does, and are too weak to
+/// model size 1. They decide how the field as a whole is turned where nothing else does, and are too weak to
 /// decide anything local.
 const INITIAL_DIRECTIONS: f64 = 0.5;
 /// Rounds of solving for the first field: in each one more principal directions agree with it.

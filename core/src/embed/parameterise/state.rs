@@ -33,7 +33,7 @@ pub struct FeatureEdges {
     /// Number of sharp edges.
     pub total: usize,
     /// Number of those on isolines of the map: one coordinate is the same at both ends up to 1e-9, in units in which
-    /// the surface's bounding-box diagonal is 1.
+    /// the surface's model size is 1.
     pub on_isolines: usize,
     /// The end points of the others.
     pub off_isolines: Vec<[[f64; 3]; 2]>,
@@ -42,7 +42,7 @@ pub struct FeatureEdges {
 /// Ratio of an image's area to its target area at and below which the triangle counts as flipped: degenerate up to
 /// rounding errors. Chosen by hand.
 const FLAT: f64 = 1e-3;
-/// Coordinates that differ by no more count as equal: rounding on a surface of bounding-box diagonal 1.
+/// Coordinates that differ by no more count as equal: rounding on a surface of model size 1.
 const EQUAL: f64 = 1e-9;
 
 impl State {

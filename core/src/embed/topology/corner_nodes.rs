@@ -12,7 +12,7 @@ use glam::DVec3;
 use crate::embed::topology::embedding_topology::EmbeddingTopology;
 use crate::mesh::{Dijkstra, HalfedgeId, TriMesh, VertexId};
 
-/// Distance along edges below which a node is moved to a corner, as a fraction of the bounding-box diagonal: farther
+/// Distance along edges below which a node is moved to a corner, as a fraction of the model size: farther
 /// nodes belong to other parts of the surface.
 const REACH: f64 = 0.2;
 /// Cosine of the angle between two feature edges at a vertex up to which they continue each other: 135°, half way

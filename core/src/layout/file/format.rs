@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::mesh::{MeshSource, TriMesh, VertexId, fingerprint};
+use crate::mesh::{MeshSource, NormalisedBy, TriMesh, VertexId, fingerprint};
 use crate::output::{self, FileKind, OutputError};
 use crate::surface::{Crossing, SurfacePoint};
 
@@ -20,7 +20,10 @@ pub struct LayoutFile {
     pub version: u32,
     /// The source of the mesh; a relative path is relative to the folder of the file.
     pub mesh: MeshSource,
-    /// Fingerprint of the mesh, to detect that it has changed. Without one, any mesh with the named elements is
+    /// What the mesh is normalised by. The embedding is optimised in these coordinates.
+    #[serde(default = "NormalisedBy::unnamed", skip_serializing_if = "NormalisedBy::is_unnamed")]
+    pub normalised_by: NormalisedBy,
+    /// Fingerprint of the normalised mesh, to detect that it has changed. Without one, any mesh with the named elements is
     /// accepted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingerprint: Option<String>,
@@ -141,10 +144,10 @@ struct Head {
 }
 
 impl LayoutFile {
-    /// A layout without nodes on `mesh`.
+    /// A layout without nodes on `mesh`. If that is not normalised by its bounding box, `normalised_by` is to be set.
     pub fn new(source: MeshSource, mesh: &TriMesh) -> Self {
-        let fingerprint = Some(fingerprint(mesh));
-        Self { version: VERSION, mesh: source, fingerprint, nodes: Vec::new(), arcs: Vec::new() }
+        let (normalised_by, fingerprint) = (NormalisedBy::unnamed(), Some(fingerprint(mesh)));
+        Self { version: VERSION, mesh: source, normalised_by, fingerprint, nodes: Vec::new(), arcs: Vec::new() }
     }
 
     /// Reads a layout file.

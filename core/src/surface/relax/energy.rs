@@ -26,7 +26,7 @@ const ALIGNMENT_STEP: f64 = 1e-3;
 /// Least angle of a triangle, in radians. Smaller angles count as this one, so that needles do not cause a division by
 /// zero.
 const MIN_ANGLE: f64 = 1e-7;
-/// Least length of a segment, for meshes of bounding-box diagonal 1. Shorter segments count as this long; the square is
+/// Least length of a segment, for meshes of model size 1. Shorter segments count as this long; the square is
 /// still a normal number.
 const MIN_LENGTH: f64 = 1e-100;
 /// Least decrease of a step, as a fraction of what the gradient predicts (Armijo condition).

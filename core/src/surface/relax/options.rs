@@ -16,7 +16,7 @@ pub type Alignment<'a> = dyn Fn(FaceId, DVec3) -> f64 + Sync + 'a;
 pub struct RelaxOptions<'a> {
     /// Weight `α` of the alignment in (8.1); 1 in the thesis.
     pub alpha: f64,
-    /// Weight `β` of the squared curvature in (8.1); 0.25 in the thesis, for models of bounding-box diagonal 1.
+    /// Weight `β` of the squared curvature in (8.1); 0.25 in the thesis, for models of size 1.
     pub beta: f64,
     /// The alignment `q`; `None` for 0.
     pub alignment: Option<&'a Alignment<'a>>,
@@ -28,6 +28,9 @@ pub struct RelaxOptions<'a> {
     pub t_min: f64,
     /// Points that the curve passes at a distance of at most a fraction of an edge.
     pub waypoints: Vec<Waypoint>,
+    /// Fraction by which distances and forces must differ for the smaller or larger one to be taken; else the first is. 0: any
+    /// difference counts, also one by rounding. Then the result depends on the position of the mesh in space.
+    pub tie: f64,
     /// Most rounds of sliding and passing over vertices.
     pub rounds: usize,
     /// Most rounds in which the vertices that still block the curve are tried one by one. 0 takes about half the time
@@ -45,6 +48,7 @@ impl Default for RelaxOptions<'_> {
             tube: 2.5,
             t_min: 0.03,
             waypoints: Vec::new(),
+            tie: 0.0,
             rounds: 8,
             trials: 10,
         }

@@ -9,7 +9,7 @@ use crate::mesh::TriMesh;
 use crate::surface::vertex_fan::Side;
 
 /// Weight of the squared distance from a waypoint, relative to that of bending. A curve displaced at one point deforms
-/// over a length `λ` of about half a bounding-box diagonal and resists with a stiffness of `192 / λ³`, about a
+/// over a length `λ` of about half a model size and resists with a stiffness of `192 / λ³`, about a
 /// thousand; this weight is far larger, so the curve nearly passes the point. It is far smaller than the cost of a kink
 /// at a single edge.
 const WAYPOINT_WEIGHT: f64 = 2e4;
@@ -94,6 +94,7 @@ impl<'a> Tube<'a> {
     /// The point nearest to `p` on the segments around `reference`.
     fn foot(&self, p: DVec3, reference: usize) -> Foot {
         let (n, reach) = (self.n_segments(), SEARCH_REACH.min(self.n_segments() / 2));
+        let margin = (self.options.tie * self.radius).powi(2);
         let mut least = f64::INFINITY;
         let mut best = Foot { point: self.points[0], along: DVec3::ZERO, segment: 0 };
         for k in 0..=2 * reach {
@@ -109,8 +110,10 @@ impl<'a> Tube<'a> {
             let along = self.points[(segment + 1) % self.points.len()] - a;
             let s = (along.dot(p - a) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             let point = a + along * s;
-            if point.distance_squared(p) < least {
-                least = point.distance_squared(p);
+            let distance = point.distance_squared(p);
+            // A crossing of the original curve is on two of its segments: rounding must not decide whose tangent it has.
+            if distance + margin < least {
+                least = distance;
                 best = Foot { point, along, segment };
             }
         }

@@ -112,6 +112,10 @@ fn blocking_vertices(tube: &Tube<'_>, strip: &TriangleStrip, forces: &[f64]) -> 
             blocking.push((force.abs(), strip.end(tube.mesh, i, side), side));
         }
     }
+    if tube.options.tie > 0.0 {
+        let unit = tube.options.tie * blocking.iter().map(|b| b.0).fold(0.0, f64::max);
+        blocking.iter_mut().for_each(|b| b.0 = (b.0 / unit).round());
+    }
     blocking.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     blocking.into_iter().map(|p| (p.1, p.2)).collect()
 }

@@ -40,7 +40,7 @@ pub struct ExportOptions {
 
 impl Default for ExportOptions {
     fn default() -> Self {
-        // With 6000 quads the distance to the surface is well below half a percent of the diagonal.
+        // With 6000 quads the distance to the surface is well below half a percent of the model size.
         Self {
             size: QuadSize::Count(6000),
             embedding: Some(Settings::default()),

@@ -17,7 +17,7 @@ use crate::surface::{SurfacePoint, nearest_in_triangle};
 use crate::weave::error::WeaveError;
 use crate::weave::export::input::EmbeddingInput;
 
-/// Distance from a sharp edge up to which a vertex lies on it, on a surface of bounding-box diagonal 1: a tenth of the
+/// Distance from a sharp edge up to which a vertex lies on it, on a surface of model size 1: a tenth of the
 /// smallest visible width.
 const ON_FEATURE: f64 = 1e-4;
 /// Scaled Jacobian below which a quad releases the fixed vertices around it. Chosen by hand.

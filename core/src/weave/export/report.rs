@@ -273,7 +273,7 @@ fn layout_section(e: &Export, loaded: &LoadedMesh) -> LayoutSection {
         quads: e.quads.quads.len(),
         folded_quads,
         mean_scaled_jacobian,
-        hausdorff_distance: resampling_error(&e.quads, &loaded.mesh),
+        hausdorff_distance: resampling_error(&e.quads, &loaded.mesh) / loaded.diagonal(),
         flipped_triangles,
         embedding: embedding_section(e, loaded),
         checks,

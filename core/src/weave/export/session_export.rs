@@ -97,6 +97,7 @@ fn layout_file(session: &Session, export: &Export) -> Result<LayoutFile, WeaveEr
     let pinned = initial.pinned(&design.pins);
     let mesh = &session.model().loaded.mesh;
     let mut file = LayoutFile::from_embedding(design.mesh.clone(), mesh, &export.layout, embedding)?;
+    file.normalised_by = design.options.normalised_by;
     file.nodes.iter_mut().zip(pinned.nodes).for_each(|(node, pinned)| node.fixed = pinned);
     file.arcs.iter_mut().zip(pinned.arcs).for_each(|(arc, pinned)| arc.fixed = pinned);
     Ok(file)

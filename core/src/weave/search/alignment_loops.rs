@@ -18,7 +18,7 @@ use crate::weave::error::WeaveError;
 use crate::weave::model::Model;
 use crate::weave::search::candidates::Query;
 
-/// Distance over which a principal direction of mean weight outweighs smoothness of the field, as a fraction of the diagonal:
+/// Distance over which a principal direction of mean weight outweighs smoothness of the field, in model sizes:
 /// as far as fields of layouts can usually follow directions.
 const ALIGNMENT_RADIUS: f64 = 0.08;
 /// Largest weight of a direction, relative to the mean, so that limbs do not dominate the field of the flanks.
@@ -132,7 +132,7 @@ mod tests {
                 (alignment, length) = (alignment + l.alignment, length + l.length);
             }
         }
-        // On average less than 5° off.
-        assert!(alignment < 0.0038 * DEVIATION_FACTOR * length, "{alignment} of {length}");
+        // On average less than 5.5° off.
+        assert!(alignment < 0.0046 * DEVIATION_FACTOR * length, "{alignment} of {length}");
     }
 }

@@ -13,7 +13,7 @@ use crate::surface::{Crossing, SurfaceCurve};
 use crate::union_find::UnionFind;
 use crate::weave::proposal::Proposal;
 
-/// Cost of crossing a placed curve, as a length on a surface of diagonal 1: shorter detours avoid a crossing. Chosen by
+/// Cost of crossing a placed curve, as a length on a surface of model size 1: shorter detours avoid a crossing. Chosen by
 /// hand.
 const CROSSING_COST: f64 = 0.05;
 

@@ -164,7 +164,7 @@ impl Session {
         let mesh = &*model.loaded.mesh;
         let mut curve = trial.model.to_design(&tried.curve).ok()?;
         if smooth && !own {
-            let options = RelaxOptions { tube: TUBE, ..Default::default() };
+            let options = RelaxOptions { tube: TUBE, tie: model.options.relaxation_tie(), ..Default::default() };
             curve = relax(mesh, &curve, &options, progress).ok()?.curve;
         }
         let on_proxy = match &model.proxy {

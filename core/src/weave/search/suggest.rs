@@ -108,7 +108,8 @@ impl Session {
         progress: &Progress,
     ) -> Result<Proposal, Cancelled> {
         let model = self.model();
-        let relaxed = relax(&model.mesh, &proposal.curve, &RelaxOptions { tube, ..Default::default() }, progress);
+        let options = RelaxOptions { tube, tie: model.options.relaxation_tie(), ..Default::default() };
+        let relaxed = relax(&model.mesh, &proposal.curve, &options, progress);
         progress.check()?;
         let Ok(relaxed) = relaxed else { return Ok(proposal) };
         let helps = self.gain(&relaxed.curve, before, goal).is_some();

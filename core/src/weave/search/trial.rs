@@ -30,7 +30,7 @@ const LOOPS: usize = 4;
 const POOL: usize = 16;
 /// Groups of candidates tried together in a round, as size and number: pairs and triples. Chosen by hand.
 const GROUPS: [(usize, usize); 2] = [(2, 3), (3, 4)];
-/// Largest distance of the second point of a round from the first, on a surface of bounding-box diagonal 1: about the width
+/// Largest distance of the second point of a round from the first, on a surface of model size 1: about the width
 /// of a limb. Chosen by hand.
 const NEARBY: f64 = 0.12;
 /// Number of draws for a second point. Chosen by hand.

@@ -2,6 +2,7 @@
 
 mod editing;
 mod improving;
+mod turning;
 
 use std::path::Path;
 
@@ -19,7 +20,7 @@ use crate::progress::Progress;
 use crate::testing::{grid, square, torus};
 
 fn loaded(mesh: TriMesh) -> LoadedMesh {
-    let units = Normalisation { centre: DVec3::ZERO, scale: 1.0 };
+    let units = Normalisation { by: Options::default().normalised_by, centre: DVec3::ZERO, scale: 1.0 };
     LoadedMesh { mesh: mesh.into(), units, repairs: Vec::new(), name: "test".into() }
 }
 

@@ -103,8 +103,8 @@ fn homology_classes(model: &Model, arrangement: &Arrangement) -> HomologyClasses
     HomologyClasses::new(mesh, corners.chain(crossings))
 }
 
-/// Masks the directions along the spines of some of the strips.
-fn mask_spines(model: &Model, strips: &[Strip], closes: impl Fn(usize) -> bool) -> DirectionMask {
+/// The directions along the spines of some of the strips, given by their numbers in order.
+pub(in crate::weave) fn mask_spines(model: &Model, strips: &[Strip], closes: impl Fn(usize) -> bool) -> DirectionMask {
     let mut mask = DirectionMask::all_open();
     for (_, strip) in strips.iter().enumerate().filter(|(i, _)| closes(*i)) {
         mask_spine(model, strip, &mut mask);

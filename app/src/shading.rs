@@ -2,15 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId};
-use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
+use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId, Stripes};
+use crate::palette::{strip_rgb, strip_rgba};
+use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceStripes, SurfaceVertex};
 
-/// Colour of placed strips.
-pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
-/// Colour of placed strips while a layout is shown.
-const FAINT: [u8; 4] = [0x1f, 0x5f, 0xd0, 0x70];
-/// Colour of the selected strip.
-pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
+/// Opacity of placed strips while a layout is shown.
+const FAINT: u8 = 0x80;
 /// Colour of the proposal that a click would place.
 pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
 /// Colour of arcs.
@@ -57,20 +54,42 @@ pub fn surface(display: &DisplaySurface, tints: Option<&[[u8; 4]]>) -> SurfaceMe
             None => region(f),
         };
         let tint = tint.unwrap_or_default();
-        let stripes = display.stripes.get(f).copied().unwrap_or_default();
-        for corner in 0..3 {
-            let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
-            let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
-            vertices.push(SurfaceVertex {
-                position: position.as_vec3().to_array(),
-                normal: normal.as_vec3().to_array(),
-                tint,
-                stripe: stripes.map(|s| s.map_or(0.0, |s| s.at[corner] as f32)),
-                reach: stripes.map(|s| s.map_or([0; 2], |s| s.reach)),
-            });
-        }
+        vertices.extend(triangle(display, f, *face, tint, strip_rgb));
     }
     SurfaceMesh { vertices }
+}
+
+/// The stripes of a surface alone, in one colour, to be drawn over another surface: for a proposal.
+pub fn bands(display: &DisplaySurface, rgb: [u8; 3]) -> SurfaceMesh {
+    let striped = |f: usize| display.stripes.get(f).is_some_and(|s| s.iter().any(Option::is_some));
+    let faces = display.faces.iter().enumerate().filter(|&(f, _)| striped(f));
+    SurfaceMesh { vertices: faces.flat_map(|(f, &face)| triangle(display, f, face, [0; 4], |_| rgb)).collect() }
+}
+
+/// The three corners of face `f`. `rgb` are the colours of strips.
+fn triangle(
+    display: &DisplaySurface,
+    f: usize,
+    face: [u32; 3],
+    tint: [u8; 4],
+    rgb: impl Fn(StripId) -> [u8; 3],
+) -> [SurfaceVertex; 3] {
+    let stripes = display.stripes.get(f).copied().unwrap_or_default();
+    [0, 1, 2].map(|corner: usize| {
+        let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
+        let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
+        let pattern = |s: Stripes| {
+            let [r, g, b] = rgb(s.strip);
+            let strength = (s.strength[corner] * 255.0).round() as u8;
+            SurfaceStripes::new(s.at[corner], s.bulge, s.reach, [r, g, b, strength])
+        };
+        SurfaceVertex {
+            position: position.as_vec3().to_array(),
+            normal: normal.as_vec3().to_array(),
+            tint,
+            stripes: stripes.map(|s| s.map(pattern).unwrap_or_default()),
+        }
+    })
 }
 
 /// Points of the surface by which the camera frames it; a sample of large surfaces.
@@ -142,13 +161,14 @@ pub fn overlay(overlay: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     if overlay.strips {
         for strip in overlay.scene.strips.iter().filter(|s| s.visible) {
             let selected = overlay.selected == Some(strip.id);
-            let points = points(&strip.polyline);
+            let (points, colour) = (points(&strip.polyline), strip_rgba(strip.id));
             match (selected, layout) {
-                (true, _) => outlined(&mut lines, points, strip.closed, SELECTED, 4.5),
-                (false, None) => outlined(&mut lines, points, strip.closed, PLACED, 2.6),
+                (true, _) => outlined(&mut lines, points, strip.closed, colour, 5.0),
+                (false, None) => outlined(&mut lines, points, strip.closed, colour, 2.8),
                 // Strips are faint while a layout is shown.
                 (false, Some(_)) => {
-                    lines.push(Polyline { points, closed: strip.closed, colour: FAINT, width: 1.8, hidden: 0.0 });
+                    let colour = [colour[0], colour[1], colour[2], FAINT];
+                    lines.push(Polyline { points, closed: strip.closed, colour, width: 1.8, hidden: 0.0 });
                 }
             }
         }

@@ -1,0 +1,51 @@
+//! How strongly a strip is drawn at each vertex of its sheets: it fades where it is cut off or its map is distorted.
+//!
+//! The drawn part is an opening of the sheet: what lies within the distance [`SOFT`] of a *core*, whose points are farther
+//! than that from every cut. So the pattern ends in a soft edge instead of the outline of triangles, and slivers of a
+//! sheet, which would be stubs and tangles, are not drawn at all.
+
+use plait_core::mesh::Dijkstra;
+
+use super::sheet::{Sheets, following, preceding};
+use super::smooth::Gradients;
+
+/// Width of the soft edge, in bounding-box diagonals. Wider than the distance of two lines, so that no line ends abruptly.
+/// Chosen by hand.
+const SOFT: f64 = 0.018;
+/// Least width of the soft edge, in mean edge lengths: on a coarse mesh it must reach across a triangle. Chosen by hand.
+const SOFT_EDGES: f64 = 1.5;
+/// Lengths of the gradient of the distance that count as undistorted. It is 1 for an isometric map.
+const UNDISTORTED: std::ops::RangeInclusive<f64> = 0.30..=3.0;
+/// Length of the mean gradient around a vertex relative to the mean of the lengths. Below this, the isolines turn by more
+/// than about 45 degrees from triangle to triangle. Chosen by hand.
+const COHERENT: f64 = 0.72;
+
+/// The strength at each vertex, 0 to 1.
+pub fn strengths(sheets: &Sheets, gradients: &Gradients<'_>, mean_edge: f64) -> Vec<f64> {
+    let soft = SOFT.max(SOFT_EDGES * mean_edge);
+    let bad = |v: usize| {
+        let (length, coherence) = (gradients.at_vertex[v].length(), gradients.coherence[v]);
+        sheets.cut[v] || !UNDISTORTED.contains(&length) || coherence < COHERENT
+    };
+    let to_cut = distances(sheets, gradients, (0..sheets.len()).filter(|&v| bad(v)));
+    // A sheet without a cut is not reached, and therefore all core.
+    let to_core = distances(sheets, gradients, (0..sheets.len()).filter(|&v| to_cut[v] >= soft));
+    to_core.into_iter().map(|d| (1.0 - d / soft).clamp(0.0, 1.0)).collect()
+}
+
+/// The distance of each vertex from the nearest start, along edges; infinite where there is none on its sheet.
+fn distances(sheets: &Sheets, gradients: &Gradients<'_>, starts: impl Iterator<Item = usize>) -> Vec<f64> {
+    let mut search: Dijkstra<u32, ()> = Dijkstra::new(sheets.len());
+    for v in starts {
+        search.start(v as u32, 0.0);
+    }
+    while let Some((v, distance)) = search.settle() {
+        for &c in sheets.corners(v as usize) {
+            for other in [following(c), preceding(c)] {
+                let length = gradients.side(c, other).length();
+                search.reach(sheets.vertex_of_corner[other as usize], distance + length, ());
+            }
+        }
+    }
+    (0..sheets.len() as u32).map(|v| search.distance(v)).collect()
+}

@@ -1,0 +1,132 @@
+//! Smooth distances from the spine: gradients at the vertices of sheets, and isolines without kinks.
+//!
+//! The strip map is linear on each triangle, so its isolines have a kink at every edge. Here each vertex gets the mean
+//! gradient of its triangles. Distances are adjusted to the gradients, and along each edge the two gradients give a
+//! quadratic function, which the shader evaluates per pixel.
+
+use glam::{DQuat, DVec3};
+use plait_core::mesh::{FaceId, TriMesh};
+use rayon::prelude::*;
+
+use super::sheet::{Sheets, following, preceding};
+
+/// Rounds of smoothing. More would pull lines off the map; none leaves the noise of coarse meshes. Chosen by hand.
+const ROUNDS: usize = 6;
+/// Part of the way to the predicted distance in each round; 1 would oscillate. Chosen by hand.
+const STEP: f64 = 0.6;
+/// Distances below this belong to the spine and stay, in lengths on the mesh.
+const ON_SPINE: f64 = 1e-7;
+
+/// The gradients of the distance, on triangles and at vertices of sheets.
+pub struct Gradients<'a> {
+    mesh: &'a TriMesh,
+    /// Unit normal and twice the area of each triangle.
+    normals: Vec<(DVec3, f64)>,
+    /// The mean gradient of the triangles around each vertex, in the tangent plane of the vertex.
+    pub at_vertex: Vec<DVec3>,
+    /// The length of the mean gradient divided by the mean length: 1 where all agree, near 0 where they contradict.
+    pub coherence: Vec<f64>,
+    vertex_normals: Vec<DVec3>,
+}
+
+impl<'a> Gradients<'a> {
+    /// The gradients of the distances of `sheets` on `mesh`.
+    pub fn new(mesh: &'a TriMesh, sheets: &Sheets) -> Self {
+        let scaled = |f: FaceId| {
+            let [a, b, c] = mesh.face_vertices(f).map(|v| mesh.position(v));
+            (b - a).cross(c - a)
+        };
+        let normals: Vec<_> = mesh.faces().map(|f| (scaled(f).normalize_or_zero(), scaled(f).length())).collect();
+        let normal = |v: usize| {
+            let sum: DVec3 = sheets.corners(v).iter().map(|&c| normals[c as usize / 6]).map(|(n, a)| n * a).sum();
+            sum.try_normalize().unwrap_or(DVec3::Z)
+        };
+        let vertex_normals = (0..sheets.len()).into_par_iter().map(normal).collect();
+        let mut gradients =
+            Self { mesh, normals, vertex_normals, at_vertex: Vec::new(), coherence: Vec::new() };
+        gradients.update(sheets);
+        gradients
+    }
+
+    /// Computes the gradients anew from the present distances.
+    fn update(&mut self, sheets: &Sheets) {
+        let mean = |v: usize| {
+            let (mut sum, mut lengths, mut weights) = (DVec3::ZERO, 0.0, 0.0);
+            for &c in sheets.corners(v) {
+                let (normal, area) = self.normals[c as usize / 6];
+                let gradient = self.on_triangle(sheets, c);
+                // Unfolded into the tangent plane, so that a sharp edge of the surface is no bend.
+                let turned = DQuat::from_rotation_arc(normal, self.vertex_normals[v]) * gradient;
+                sum += turned * area;
+                lengths += gradient.length() * area;
+                weights += area;
+            }
+            (sum / f64::max(weights, 1e-300), sum.length() / f64::max(lengths, 1e-300))
+        };
+        let means: Vec<_> = (0..sheets.len()).into_par_iter().map(mean).collect();
+        (self.at_vertex, self.coherence) = means.into_iter().unzip();
+    }
+
+    /// The gradient on the triangle of a corner; zero on a degenerate one.
+    fn on_triangle(&self, sheets: &Sheets, c: u32) -> DVec3 {
+        let (normal, double_area) = self.normals[c as usize / 6];
+        if double_area < 1e-14 {
+            return DVec3::ZERO;
+        }
+        let corners = [c, following(c), preceding(c)];
+        let term = |i: usize| {
+            let opposite = self.side(corners[(i + 1) % 3], corners[(i + 2) % 3]);
+            normal.cross(opposite) * sheets.distance[sheets.vertex_of_corner[corners[i] as usize] as usize]
+        };
+        (term(0) + term(1) + term(2)) / double_area
+    }
+
+    /// The vector from one corner of a triangle to another.
+    pub fn side(&self, from: u32, to: u32) -> DVec3 {
+        let corners = self.mesh.face_vertices(FaceId(from / 6));
+        self.mesh.position(corners[to as usize % 3]) - self.mesh.position(corners[from as usize % 3])
+    }
+
+    /// The change of the distance along `side` by the gradient at a vertex. The side is unfolded into the tangent plane.
+    fn change(&self, vertex: usize, side: DVec3) -> f64 {
+        let normal = self.vertex_normals[vertex];
+        let tangent = (side - normal * normal.dot(side)).normalize_or_zero() * side.length();
+        self.at_vertex[vertex].dot(tangent)
+    }
+
+    /// By how much the distance in the middle of a side, a control point of a quadratic Bézier triangle, exceeds the mean of
+    /// its ends.
+    pub fn bulge(&self, sheets: &Sheets, from: u32, to: u32) -> f64 {
+        let side = self.side(from, to);
+        let [a, b] = [from, to].map(|c| sheets.vertex_of_corner[c as usize] as usize);
+        0.25 * (self.change(a, side) - self.change(b, side))
+    }
+}
+
+/// Smooths the distances of `sheets`, and returns their gradients. The spines stay where they are.
+pub fn smooth<'a>(mesh: &'a TriMesh, sheets: &mut Sheets) -> Gradients<'a> {
+    let mut gradients = Gradients::new(mesh, sheets);
+    for _ in 0..ROUNDS {
+        let adjusted = |v: usize| {
+            let present = sheets.distance[v];
+            if present.abs() < ON_SPINE {
+                return present;
+            }
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for &c in sheets.corners(v) {
+                for other in [following(c), preceding(c)] {
+                    let side = gradients.side(other, c);
+                    let w = sheets.vertex_of_corner[other as usize] as usize;
+                    let along = 0.5 * (gradients.change(v, side) + gradients.change(w, side));
+                    let weight = 1.0 / side.length().max(1e-9);
+                    sum += weight * (sheets.distance[w] + along);
+                    weights += weight;
+                }
+            }
+            present + STEP * (sum / weights - present)
+        };
+        sheets.distance = (0..sheets.len()).into_par_iter().map(adjusted).collect();
+        gradients.update(sheets);
+    }
+    gradients
+}

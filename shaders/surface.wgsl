@@ -76,12 +76,12 @@ const SHAPE = vec4f(0.05, 0.05, 0.05, 2.0);
 // Distance of two lines on the screen, in points; from 0.8 to 1.25 times that, as the view is zoomed.
 const LINE_DISTANCE = 11.0;
 // Width of a line, in points.
-const LINE_WIDTH = 1.5;
+const LINE_WIDTH = 1.6;
 // Opacity of the lines, and of the colour between them.
-const LINE_OPACITY = 0.86;
-const FILL_OPACITY = 0.20;
+const LINE_OPACITY = 0.92;
+const FILL_OPACITY = 0.22;
 // Over this length a strip fades towards its end; narrow strips over a part of their width.
-const SOFT_END = 0.016;
+const SOFT_END = 0.010;
 const SOFT_PART = 0.6;
 
 const MATERIAL = vec3f(0.66, 0.635, 0.60);
@@ -117,6 +117,10 @@ fn stripes(linear_distance: f32, shape: vec4f, colour: vec4f, corner: vec3f) -> 
     let end = smoothstep(0.0, 1.0, (shape.w - abs(distance)) / max(soft, 1e-6));
     let strength = end * smoothstep(0.0, 1.0, colour.a) * view.toggles.x;
     return vec4f(decode(colour.rgb), strength * mix(FILL_OPACITY, LINE_OPACITY, line));
+}
+
+fn over(below: vec3f, above: vec4f) -> vec3f {
+    return mix(below, above.rgb, above.a);
 }
 
 fn encode(linear: vec3f) -> vec3f {
@@ -158,8 +162,8 @@ fn fragment_main(in: Varying, @builtin(front_facing) front: bool) -> @location(0
     // The material, under the colour of the region and that of the strips.
     var albedo = select(BACK_MATERIAL, MATERIAL, front);
     albedo = mix(albedo, decode(in.tint.rgb), in.tint.a * view.toggles.z);
-    albedo = mix(albedo, stripes_u.rgb, stripes_u.a);
-    albedo = mix(albedo, stripes_v.rgb, stripes_v.a);
+    // Neither of two strips is on top: which is the first differs from triangle to triangle.
+    albedo = 0.5 * (over(over(albedo, stripes_u), stripes_v) + over(over(albedo, stripes_v), stripes_u));
     var colour = lit(albedo, in, front);
 
     let near_edge = clamp(1.2 - in.corner / max(edge_width, vec3f(1e-6)), vec3f(0.0), vec3f(1.0));
@@ -174,6 +178,6 @@ fn band_fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0
     let u = stripes(in.distance.x, in.shape_u, in.colour_u, in.corner);
     let v = stripes(in.distance.y, in.shape_v, in.colour_v, in.corner);
     let alpha = 1.0 - (1.0 - u.a) * (1.0 - v.a);
-    let albedo = (u.rgb * u.a * (1.0 - v.a) + v.rgb * v.a) / max(alpha, 1e-6);
+    let albedo = (u.rgb * u.a * (1.0 - 0.5 * v.a) + v.rgb * v.a * (1.0 - 0.5 * u.a)) / max(alpha, 1e-6);
     return vec4f(encode(lit(albedo, in, front)) * alpha, alpha);
 }

@@ -1,10 +1,11 @@
 //! How strongly a strip is drawn at each vertex of its sheets: it fades where it is cut off or its map is distorted.
 //!
 //! The drawn part is an opening of the sheet: what lies within the distance [`SOFT`] of a *core*, whose points are farther
-//! than that from every cut. So the pattern ends in a soft edge instead of the outline of triangles, and slivers of a
-//! sheet, which would be stubs and tangles, are not drawn at all.
+//! than that from every cut and connected with the spine. So the pattern ends in a soft edge instead of the outline of
+//! triangles. Slivers of a sheet, and parts behind a bottleneck, where a strip turns around a singularity, would be stubs
+//! and tangles; they are not drawn at all.
 
-use plait_core::mesh::Dijkstra;
+use plait_core::mesh::{BreadthFirst, Dijkstra};
 
 use super::sheet::{Sheets, following, preceding};
 use super::smooth::Gradients;
@@ -29,8 +30,23 @@ pub fn strengths(sheets: &Sheets, gradients: &Gradients<'_>, mean_edge: f64) -> 
     };
     let to_cut = distances(sheets, gradients, (0..sheets.len()).filter(|&v| bad(v)));
     // A sheet without a cut is not reached, and therefore all core.
-    let to_core = distances(sheets, gradients, (0..sheets.len()).filter(|&v| to_cut[v] >= soft));
+    let core = connected_with_spine(sheets, |v| to_cut[v] >= soft);
+    let to_core = distances(sheets, gradients, (0..sheets.len()).filter(|&v| core[v]));
     to_core.into_iter().map(|d| (1.0 - d / soft).clamp(0.0, 1.0)).collect()
+}
+
+/// Which vertices are connected with a spine by vertices that are `inside`.
+fn connected_with_spine(sheets: &Sheets, inside: impl Fn(usize) -> bool) -> Vec<bool> {
+    let mut search: BreadthFirst<u32, ()> = BreadthFirst::new(sheets.len());
+    for v in (0..sheets.len()).filter(|&v| inside(v) && sheets.is_on_spine(v)) {
+        search.start(v as u32);
+    }
+    while let Some(v) = search.visit() {
+        for other in sheets.neighbours(v as usize).filter(|&w| inside(w as usize)) {
+            search.reach(other, ());
+        }
+    }
+    (0..sheets.len() as u32).map(|v| search.is_reached(v)).collect()
 }
 
 /// The distance of each vertex from the nearest start, along edges; infinite where there is none on its sheet.

@@ -10,6 +10,9 @@ use plait_core::strip::StripMap;
 /// bounding-box diagonal of 1. Far above the rounding of `f32`, far below the distance of two lines.
 const SAME_DISTANCE: f32 = 1e-5;
 
+/// Distances below this are those of points on the spine, in lengths on the mesh: 0 up to rounding.
+const ON_SPINE: f64 = 1e-7;
+
 /// No vertex of a sheet.
 pub const NONE: u32 = u32::MAX;
 
@@ -62,6 +65,17 @@ impl Sheets {
     /// The corners of a vertex.
     pub fn corners(&self, vertex: usize) -> &[u32] {
         &self.corners[self.first[vertex] as usize..self.first[vertex + 1] as usize]
+    }
+
+    /// The vertices joined to a vertex by an edge, some of them twice.
+    pub fn neighbours(&self, vertex: usize) -> impl Iterator<Item = u32> {
+        let others = self.corners(vertex).iter().flat_map(|&c| [following(c), preceding(c)]);
+        others.map(|c| self.vertex_of_corner[c as usize])
+    }
+
+    /// Whether the vertex lies on the spine of its strip.
+    pub fn is_on_spine(&self, vertex: usize) -> bool {
+        self.distance[vertex].abs() < ON_SPINE
     }
 
     /// The vertices of a covered triangle.

@@ -11,11 +11,9 @@ use rayon::prelude::*;
 use super::sheet::{Sheets, following, preceding};
 
 /// Rounds of smoothing. More would pull lines off the map; none leaves the noise of coarse meshes. Chosen by hand.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 12;
 /// Part of the way to the predicted distance in each round; 1 would oscillate. Chosen by hand.
 const STEP: f64 = 0.6;
-/// Distances below this belong to the spine and stay, in lengths on the mesh.
-const ON_SPINE: f64 = 1e-7;
 
 /// The gradients of the distance, on triangles and at vertices of sheets.
 pub struct Gradients<'a> {
@@ -109,7 +107,7 @@ pub fn smooth<'a>(mesh: &'a TriMesh, sheets: &mut Sheets) -> Gradients<'a> {
     for _ in 0..ROUNDS {
         let adjusted = |v: usize| {
             let present = sheets.distance[v];
-            if present.abs() < ON_SPINE {
+            if sheets.is_on_spine(v) {
                 return present;
             }
             let (mut sum, mut weights) = (0.0, 0.0);

@@ -1,10 +1,12 @@
 //! The stripe pattern that shows what each strip covers: lines parallel to its spine.
 //!
 //! The strip map gives the distance from the spine at every corner of the covered triangles. [`sheet`] joins these
-//! triangles, [`smooth`] makes the distances smooth, [`fade`] finds where the pattern ends. The shader draws the lines
+//! triangles, [`fade`] finds where the pattern ends, [`refill`] closes the holes that this leaves in other strips, and
+//! [`smooth`] makes the distances smooth. The shader draws the lines
 //! from the [`Stripes`] of each triangle.
 
 mod fade;
+mod refill;
 mod sheet;
 mod smooth;
 #[cfg(test)]
@@ -15,7 +17,7 @@ use plait_core::strip::StripMap;
 use plait_core::weave::Session;
 use rayon::prelude::*;
 
-use self::sheet::{Sheets, following, preceding};
+use self::sheet::{Cover, Sheets, following, preceding};
 use self::smooth::Gradients;
 use crate::engine::{StripId, Stripes};
 
@@ -40,11 +42,15 @@ impl Pattern {
     /// The pattern of the strips of `map`, a strip map of `mesh`. `shown` gives the identifier of each curve, or `None` if its
     /// strip is hidden.
     pub(super) fn new(mesh: &TriMesh, map: &StripMap, shown: impl Fn(u32) -> Option<StripId> + Sync) -> Self {
-        let mut sheets = Sheets::new(mesh, map);
+        let cover = Cover::new(mesh, map);
+        let sheets = Sheets::new(&cover);
+        let strengths = fade::strengths(&sheets, &Gradients::new(mesh, &sheets), mesh.mean_edge_length());
+        let cover = refill::refilled(&cover, map, &sheets, &strengths);
+        let mut sheets = Sheets::new(&cover);
         let gradients = smooth::smooth(mesh, &mut sheets);
         let strengths = fade::strengths(&sheets, &gradients, mesh.mean_edge_length());
         let family = |f: usize, k: usize| {
-            let strip = &map.strips[map.covered[f][k]? as usize];
+            let strip = &map.strips[cover.strip[f][k]? as usize];
             Some(stripes(&sheets, &gradients, &strengths, shown(strip.curve)?, strip.widths, [f, k]))
         };
         let pattern = |f: usize| [family(f, 0), family(f, 1)];

@@ -4,7 +4,7 @@
 //! vertex of the mesh can have several distances. A sheet has a vertex of its own for each.
 
 use plait_core::mesh::{FaceId, HalfedgeId, TriMesh, components};
-use plait_core::strip::StripMap;
+use plait_core::strip::{StripCoverage, StripMap};
 
 /// Distances of a vertex in two triangles that differ by no more are equal; in lengths on the mesh, which has a
 /// bounding-box diagonal of 1. Far above the rounding of `f32`, far below the distance of two lines.
@@ -16,7 +16,33 @@ const ON_SPINE: f64 = 1e-7;
 /// No vertex of a sheet.
 pub const NONE: u32 = u32::MAX;
 
-/// All sheets of a strip map. A corner of a triangle has the number `6 f + 3 k + i`: triangle, family of isolines, corner.
+/// Which strip covers each triangle along both families of isolines, at which distances: as [`StripMap`] has it at first.
+#[derive(Clone)]
+pub struct Cover<'a> {
+    /// The mesh of the strip map.
+    pub mesh: &'a TriMesh,
+    /// The strips.
+    pub strips: &'a [StripCoverage],
+    /// See [`StripMap::covered`].
+    pub strip: Vec<[Option<u32>; 2]>,
+    /// See [`StripMap::spine_distance`].
+    pub distance: Vec<[[f32; 3]; 2]>,
+}
+
+impl<'a> Cover<'a> {
+    /// The cover of a strip map of `mesh`.
+    pub fn new(mesh: &'a TriMesh, map: &'a StripMap) -> Self {
+        Self { mesh, strips: &map.strips, strip: map.covered.clone(), distance: map.spine_distance.clone() }
+    }
+
+    /// Whether a strip is wider than the smaller of two distances on the same side of its spine.
+    pub fn is_within(&self, strip: u32, a: f32, b: f32) -> bool {
+        let width = self.strips[strip as usize].widths[usize::from(a + b < 0.0)];
+        f64::from(a.abs().min(b.abs())) < width
+    }
+}
+
+/// All sheets of a cover. A corner of a triangle has the number `6 f + 3 k + i`: triangle, family of isolines, corner.
 pub struct Sheets {
     /// The vertex of each corner; [`NONE`] where no strip covers the triangle.
     pub vertex_of_corner: Vec<u32>,
@@ -31,10 +57,10 @@ pub struct Sheets {
 }
 
 impl Sheets {
-    /// The sheets of a strip map of `mesh`.
-    pub fn new(mesh: &TriMesh, map: &StripMap) -> Self {
-        let across = Across { mesh, map };
-        let n = 6 * mesh.n_faces();
+    /// The sheets of a cover.
+    pub fn new(cover: &Cover<'_>) -> Self {
+        let across = Across { cover };
+        let n = 6 * cover.mesh.n_faces();
         let (label, n_labels) = components(n, |c: u32| across.same_vertex(c));
         let mut vertex_of_label = vec![NONE; n_labels];
         let mut sheets = Self {
@@ -53,7 +79,7 @@ impl Sheets {
             sheets.vertex_of_corner[c as usize] = *vertex;
         }
         sheets.sort_corners();
-        sheets.find_cuts(&across);
+        sheets.find_cuts(cover);
         sheets
     }
 
@@ -99,11 +125,13 @@ impl Sheets {
     }
 
     /// Marks the ends of sides that have no continuation on the other side, though the strip is wider.
-    fn find_cuts(&mut self, across: &Across<'_>) {
+    fn find_cuts(&mut self, cover: &Cover<'_>) {
+        let across = Across { cover };
         self.cut = vec![false; self.len()];
         for c in (0..self.vertex_of_corner.len() as u32).filter(|&c| across.strip(c).is_some()) {
             let (h, next) = (across.side(c), following(c));
-            if across.mesh.twin(h).is_some() && across.continued(c).is_none() && across.is_within(c, next) {
+            let inner = cover.mesh.twin(h).is_some();
+            if inner && across.continued(c).is_none() && across.is_within(c, next) {
                 for c in [c, next] {
                     self.cut[self.vertex_of_corner[c as usize] as usize] = true;
                 }
@@ -124,40 +152,37 @@ pub fn preceding(c: u32) -> u32 {
 
 /// The way from triangle to triangle within a sheet.
 struct Across<'a> {
-    mesh: &'a TriMesh,
-    map: &'a StripMap,
+    cover: &'a Cover<'a>,
 }
 
 impl Across<'_> {
     /// The strip that covers the triangle of a corner, with the family of the corner.
     fn strip(&self, c: u32) -> Option<u32> {
-        self.map.covered[c as usize / 6][c as usize / 3 % 2]
+        self.cover.strip[c as usize / 6][c as usize / 3 % 2]
     }
 
     fn distance(&self, c: u32) -> f32 {
-        self.map.spine_distance[c as usize / 6][c as usize / 3 % 2][c as usize % 3]
+        self.cover.distance[c as usize / 6][c as usize / 3 % 2][c as usize % 3]
     }
 
     /// The half-edge from a corner to the following one.
     fn side(&self, c: u32) -> HalfedgeId {
-        self.mesh.face_halfedges(FaceId(c / 6))[c as usize % 3]
+        self.cover.mesh.face_halfedges(FaceId(c / 6))[c as usize % 3]
     }
 
     /// Whether a part of the side between two corners lies within the width of the strip.
     fn is_within(&self, a: u32, b: u32) -> bool {
-        let Some(strip) = self.strip(a) else { return false };
-        let widths = self.map.strips[strip as usize].widths;
-        let (a, b) = (f64::from(self.distance(a)), f64::from(self.distance(b)));
-        a.abs().min(b.abs()) < widths[usize::from(a + b < 0.0)]
+        self.strip(a).is_some_and(|strip| self.cover.is_within(strip, self.distance(a), self.distance(b)))
     }
 
     /// The two corners beyond the side from `c` to the following corner: at the same two vertices, in that order.
     fn continued(&self, c: u32) -> Option<[u32; 2]> {
         let strip = self.strip(c)?;
-        let t = self.mesh.twin(self.side(c))?;
-        let (start, end) = (self.mesh.next(t).index() as u32 % 3, t.index() as u32 % 3);
+        let mesh = self.cover.mesh;
+        let t = mesh.twin(self.side(c))?;
+        let (start, end) = (mesh.next(t).index() as u32 % 3, t.index() as u32 % 3);
         let same = |a: u32, b: u32| (self.distance(a) - self.distance(b)).abs() < SAME_DISTANCE;
-        let beyond = [0, 3].map(|family| 6 * self.mesh.face(t).0 + family);
+        let beyond = [0, 3].map(|family| 6 * mesh.face(t).0 + family);
         let beyond = beyond.map(|base| [base + start, base + end]);
         beyond
             .into_iter()

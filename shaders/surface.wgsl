@@ -82,7 +82,7 @@ const LINE_OPACITY = 0.92;
 const FILL_OPACITY = 0.22;
 // Over this length a strip fades towards its end; narrow strips over a part of their width.
 const SOFT_END = 0.010;
-const SOFT_PART = 0.6;
+const SOFT_PART = 0.4;
 
 const MATERIAL = vec3f(0.66, 0.635, 0.60);
 const BACK_MATERIAL = vec3f(0.46, 0.44, 0.47);
@@ -111,7 +111,7 @@ fn stripes(linear_distance: f32, shape: vec4f, colour: vec4f, corner: vec3f) -> 
     let points_per_length = view.view_axes[0].w * view.size_and_planes.y / view.toggles.w;
     let level = log2(LINE_DISTANCE / points_per_length);
     let dense = exp2(floor(level));
-    let all = 1.0 - smoothstep(0.3, 0.7, fract(level));
+    let all = 1.0 - smoothstep(0.4, 0.6, fract(level));
     let line = mix(lines(distance, 2.0 * dense, per_pixel, width), lines(distance, dense, per_pixel, width), all);
     let soft = min(SOFT_END, SOFT_PART * shape.w);
     let end = smoothstep(0.0, 1.0, (shape.w - abs(distance)) / max(soft, 1e-6));

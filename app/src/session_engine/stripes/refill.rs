@@ -1,13 +1,14 @@
-//! Gives triangles of parts that are not drawn to the strips beside them.
+//! Closes holes and notches of strips.
 //!
 //! Where two strips reach a triangle along the same family of isolines, the strip map gives it to the nearer one. If that
 //! is a part which is not drawn, for instance because the strip has turned around a singularity, the other strip has a hole.
-//! Its distances are continued into the hole by the map, in the order of the distance.
+//! Its distances are continued into the hole by the map, in the order of the distance. They are also continued into
+//! triangles that no strip covers, such as flipped ones, if these have the strip on two sides.
 
 use plait_core::mesh::{DistanceQueue, FaceId, HalfedgeId};
 use plait_core::strip::StripMap;
 
-use super::sheet::{Cover, Sheets};
+use super::sheet::{Cover, Sheets, is_same};
 
 /// A triangle and a family of isolines.
 type Slot = (u32, u32);
@@ -32,7 +33,8 @@ pub fn refilled<'a>(cover: &Cover<'a>, map: &StripMap, sheets: &Sheets, strength
             let (g, k) = (g as usize, k as usize);
             let nearest = distance.iter().fold(f32::INFINITY, |least, d| least.min(d.abs()));
             let nearest = nearest.copysign(distance.iter().sum());
-            if freed[g][k] && out.strip[g][k].is_none() && out.is_within(strip, nearest, nearest) {
+            let free = out.strip[g][k].is_none() && out.is_within(strip, nearest, nearest);
+            if free && (freed[g][k] || sides(&out, g, strip, distance) > 1) {
                 out.strip[g][k] = Some(strip);
                 out.distance[g][k] = distance;
                 queue.push(f64::from(nearest.abs()), (g as u32, k as u32));
@@ -40,6 +42,22 @@ pub fn refilled<'a>(cover: &Cover<'a>, map: &StripMap, sheets: &Sheets, strength
         }
     }
     out
+}
+
+/// On how many sides of triangle `f` a strip has the given distances.
+fn sides(cover: &Cover<'_>, f: usize, strip: u32, distance: [f32; 3]) -> usize {
+    let mesh = cover.mesh;
+    let is_beyond = |h: HalfedgeId| {
+        let Some(t) = mesh.twin(h) else { return false };
+        let g = mesh.face(t).index();
+        let (start, end) = (distance[h.index() % 3], distance[mesh.next(h).index() % 3]);
+        let same = |k: usize| {
+            let there = cover.distance[g][k];
+            is_same(there[mesh.next(t).index() % 3], start) && is_same(there[t.index() % 3], end)
+        };
+        [0, 1].into_iter().any(|k| cover.strip[g][k] == Some(strip) && same(k))
+    };
+    mesh.face_halfedges(FaceId(f as u32)).into_iter().filter(|&h| is_beyond(h)).count()
 }
 
 /// What a strip would have in the next triangle.

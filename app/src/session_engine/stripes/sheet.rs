@@ -140,6 +140,11 @@ impl Sheets {
     }
 }
 
+/// Whether two distances of a vertex from a spine are equal.
+pub fn is_same(a: f32, b: f32) -> bool {
+    (a - b).abs() < SAME_DISTANCE
+}
+
 /// The corner after `c` in its triangle.
 pub fn following(c: u32) -> u32 {
     c - c % 3 + (c + 1) % 3
@@ -181,7 +186,7 @@ impl Across<'_> {
         let mesh = self.cover.mesh;
         let t = mesh.twin(self.side(c))?;
         let (start, end) = (mesh.next(t).index() as u32 % 3, t.index() as u32 % 3);
-        let same = |a: u32, b: u32| (self.distance(a) - self.distance(b)).abs() < SAME_DISTANCE;
+        let same = |a: u32, b: u32| is_same(self.distance(a), self.distance(b));
         let beyond = [0, 3].map(|family| 6 * mesh.face(t).0 + family);
         let beyond = beyond.map(|base| [base + start, base + end]);
         beyond

@@ -99,7 +99,7 @@ fn lines(distance: f32, period: f32, per_pixel: f32, width: f32) -> f32 {
     let from_line = abs(fract(distance / period + 0.5) - 0.5) * period / per_pixel;
     let line = clamp(0.5 * width + 0.5 - from_line, 0.0, 1.0);
     let pixels = period / per_pixel;
-    return mix(line, min(width / pixels, 1.0), 1.0 - smoothstep(1.6 * width, 3.0 * width, pixels));
+    return mix(line, min(width / pixels, 1.0), 1.0 - smoothstep(1.2 * width, 2.2 * width, pixels));
 }
 
 // The colour of a pixel in the pattern of a strip (not premultiplied) and its opacity.

@@ -1,11 +1,12 @@
 //! How strongly a strip is drawn at each vertex of its sheets: it fades where it is cut off or its map is distorted.
 //!
 //! The drawn part is an opening of the sheet: what lies within the distance [`SOFT`] of a *core*, whose points are farther
-//! than that from every cut and connected with the spine. So the pattern ends in a soft edge instead of the outline of
+//! than that from every cut; only large parts of it that contain a piece of the spine count. So the pattern ends in a soft edge instead of the outline of
 //! triangles. Slivers of a sheet, and parts where a strip has turned around a singularity, would be stubs and tangles; they
 //! are not drawn at all.
 
-use plait_core::mesh::{BreadthFirst, Dijkstra};
+use glam::DVec3;
+use plait_core::mesh::{Dijkstra, components};
 
 use super::sheet::{Sheets, following, preceding};
 use super::smooth::Gradients;
@@ -20,6 +21,8 @@ const SOFT_EDGES: f64 = 1.3;
 const DETOUR: f64 = 2.0;
 /// Length that the way may have in addition, in mean edge lengths.
 const DETOUR_SLACK: f64 = 1.5;
+/// Least extent of a part of the core, in widths of the soft edge: smaller parts would be stubs. Chosen by hand.
+const LEAST_EXTENT: f64 = 3.0;
 /// Lengths of the gradient of the distance that count as undistorted. It is 1 for an isometric map.
 const UNDISTORTED: std::ops::RangeInclusive<f64> = 0.30..=3.0;
 /// Length of the mean gradient around a vertex relative to the mean of the lengths. Below this, the isolines turn by more
@@ -36,24 +39,34 @@ pub fn strengths(sheets: &Sheets, gradients: &Gradients<'_>, mean_edge: f64) -> 
         sheets.cut[v] || detour || !UNDISTORTED.contains(&length) || coherence < COHERENT
     };
     let to_cut = distances(sheets, gradients, (0..sheets.len()).filter(|&v| bad(v)));
-    // A sheet without a cut is not reached, and therefore all core.
-    let core = connected_with_spine(sheets, |v| to_cut[v] >= soft);
+    let core = large_parts(sheets, gradients, |v| to_cut[v] >= soft, |v| to_cut[v].is_infinite(), LEAST_EXTENT * soft);
     let to_core = distances(sheets, gradients, (0..sheets.len()).filter(|&v| core[v]));
     to_core.into_iter().map(|d| (1.0 - d / soft).clamp(0.0, 1.0)).collect()
 }
 
-/// Which vertices are connected with a spine by vertices that are `inside`.
-fn connected_with_spine(sheets: &Sheets, inside: impl Fn(usize) -> bool) -> Vec<bool> {
-    let mut search: BreadthFirst<u32, ()> = BreadthFirst::new(sheets.len());
-    for v in (0..sheets.len()).filter(|&v| inside(v) && sheets.is_on_spine(v)) {
-        search.start(v as u32);
+/// The vertices `inside` that belong to a connected part with a piece of a spine and at least the given extent. Of `whole`
+/// sheets the extent does not matter.
+fn large_parts(
+    sheets: &Sheets,
+    gradients: &Gradients<'_>,
+    inside: impl Fn(usize) -> bool,
+    whole: impl Fn(usize) -> bool,
+    extent: f64,
+) -> Vec<bool> {
+    let joined = |v: u32| {
+        let corners = if inside(v as usize) { sheets.corners(v as usize) } else { &[] };
+        sheets.neighbours(corners).filter(|&w| inside(w as usize))
+    };
+    let (part, n_parts) = components(sheets.len(), joined);
+    let mut boxes = vec![(DVec3::MAX, DVec3::MIN); n_parts];
+    let (mut has_spine, mut is_large) = (vec![false; n_parts], vec![false; n_parts]);
+    for v in 0..sheets.len() {
+        let (p, at) = (part[v] as usize, gradients.position(sheets.corners(v)[0]));
+        boxes[p] = (boxes[p].0.min(at), boxes[p].1.max(at));
+        has_spine[p] |= sheets.is_on_spine(v);
+        is_large[p] |= whole(v) || boxes[p].0.distance(boxes[p].1) >= extent;
     }
-    while let Some(v) = search.visit() {
-        for other in sheets.neighbours(v as usize).filter(|&w| inside(w as usize)) {
-            search.reach(other, ());
-        }
-    }
-    (0..sheets.len() as u32).map(|v| search.is_reached(v)).collect()
+    (0..sheets.len()).map(|v| inside(v) && has_spine[part[v] as usize] && is_large[part[v] as usize]).collect()
 }
 
 /// The distance of each vertex from the nearest start, along edges; infinite where there is none on its sheet.

@@ -93,9 +93,9 @@ impl Sheets {
         &self.corners[self.first[vertex] as usize..self.first[vertex + 1] as usize]
     }
 
-    /// The vertices joined to a vertex by an edge, some of them twice.
-    pub fn neighbours(&self, vertex: usize) -> impl Iterator<Item = u32> {
-        let others = self.corners(vertex).iter().flat_map(|&c| [following(c), preceding(c)]);
+    /// The vertices joined by an edge to the vertex of these corners, some of them twice.
+    pub fn neighbours(&self, corners: &[u32]) -> impl Iterator<Item = u32> {
+        let others = corners.iter().flat_map(|&c| [following(c), preceding(c)]);
         others.map(|c| self.vertex_of_corner[c as usize])
     }
 

@@ -79,10 +79,14 @@ impl<'a> Gradients<'a> {
         (term(0) + term(1) + term(2)) / double_area
     }
 
+    /// The position of a corner.
+    pub fn position(&self, c: u32) -> DVec3 {
+        self.mesh.position(self.mesh.face_vertices(FaceId(c / 6))[c as usize % 3])
+    }
+
     /// The vector from one corner of a triangle to another.
     pub fn side(&self, from: u32, to: u32) -> DVec3 {
-        let corners = self.mesh.face_vertices(FaceId(from / 6));
-        self.mesh.position(corners[to as usize % 3]) - self.mesh.position(corners[from as usize % 3])
+        self.position(to) - self.position(from)
     }
 
     /// The change of the distance along `side` by the gradient at a vertex. The side is unfolded into the tangent plane.

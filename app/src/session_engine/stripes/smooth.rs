@@ -40,8 +40,7 @@ impl<'a> Gradients<'a> {
             sum.try_normalize().unwrap_or(DVec3::Z)
         };
         let vertex_normals = (0..sheets.len()).into_par_iter().map(normal).collect();
-        let mut gradients =
-            Self { mesh, normals, vertex_normals, at_vertex: Vec::new(), coherence: Vec::new() };
+        let mut gradients = Self { mesh, normals, vertex_normals, at_vertex: Vec::new(), coherence: Vec::new() };
         gradients.update(sheets);
         gradients
     }

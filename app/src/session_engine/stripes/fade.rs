@@ -60,13 +60,14 @@ fn large_parts(
     let (part, n_parts) = components(sheets.len(), joined);
     let mut boxes = vec![(DVec3::MAX, DVec3::MIN); n_parts];
     let (mut has_spine, mut is_large) = (vec![false; n_parts], vec![false; n_parts]);
-    for v in 0..sheets.len() {
-        let (p, at) = (part[v] as usize, gradients.position(sheets.corners(v)[0]));
+    for (v, &p) in part.iter().enumerate() {
+        let (p, at) = (p as usize, gradients.position(sheets.corners(v)[0]));
         boxes[p] = (boxes[p].0.min(at), boxes[p].1.max(at));
         has_spine[p] |= sheets.is_on_spine(v);
         is_large[p] |= whole(v) || boxes[p].0.distance(boxes[p].1) >= extent;
     }
-    (0..sheets.len()).map(|v| inside(v) && has_spine[part[v] as usize] && is_large[part[v] as usize]).collect()
+    let is_kept = |(v, &p): (usize, &u32)| inside(v) && has_spine[p as usize] && is_large[p as usize];
+    part.iter().enumerate().map(is_kept).collect()
 }
 
 /// The distance of each vertex from the nearest start, along edges; infinite where there is none on its sheet.

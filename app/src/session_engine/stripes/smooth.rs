@@ -4,14 +4,14 @@
 //! gradient of its triangles. Distances are adjusted to the gradients, and along each edge the two gradients give a
 //! quadratic function, which the shader evaluates per pixel.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use plait_core::mesh::{FaceId, TriMesh};
 use rayon::prelude::*;
 
-use super::sheet::{Sheets, following, preceding};
+use super::sheet::{NONE, Sheets, following, preceding};
 
 /// Rounds of smoothing. More would pull lines off the map; none leaves the noise of coarse meshes. Chosen by hand.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 8;
 /// Part of the way to the predicted distance in each round; 1 would oscillate. Chosen by hand.
 const STEP: f64 = 0.6;
 
@@ -47,13 +47,21 @@ impl<'a> Gradients<'a> {
 
     /// Computes the gradients anew from the present distances.
     fn update(&mut self, sheets: &Sheets) {
+        let slots = sheets.vertex_of_corner.len() / 3;
+        let slot = |s: usize| match sheets.vertex_of_corner[3 * s] {
+            NONE => DVec3::ZERO,
+            _ => self.on_triangle(sheets, 3 * s as u32),
+        };
+        let gradients: Vec<DVec3> = (0..slots).into_par_iter().map(slot).collect();
         let mean = |v: usize| {
             let (mut sum, mut lengths, mut weights) = (DVec3::ZERO, 0.0, 0.0);
+            let up = self.vertex_normals[v];
             for &c in sheets.corners(v) {
                 let (normal, area) = self.normals[c as usize / 6];
-                let gradient = self.on_triangle(sheets, c);
-                // Unfolded into the tangent plane, so that a sharp edge of the surface is no bend.
-                let turned = DQuat::from_rotation_arc(normal, self.vertex_normals[v]) * gradient;
+                let gradient = gradients[c as usize / 3];
+                // Unfolded into the tangent plane, so that a sharp edge of the surface is no bend: the least rotation that
+                // takes the normal up. The gradient is perpendicular to the normal.
+                let turned = gradient - (normal + up) * (up.dot(gradient) / (1.0 + normal.dot(up)).max(1e-3));
                 sum += turned * area;
                 lengths += gradient.length() * area;
                 weights += area;
@@ -108,6 +116,17 @@ impl<'a> Gradients<'a> {
 pub fn smooth<'a>(mesh: &'a TriMesh, sheets: &mut Sheets) -> Gradients<'a> {
     let mut gradients = Gradients::new(mesh, sheets);
     for _ in 0..ROUNDS {
+        // For each corner, the change of the distance to the following one by the gradients at both, and the weight of that.
+        let side = |c: usize| match sheets.vertex_of_corner[c] {
+            NONE => (0.0, 0.0),
+            v => {
+                let next = following(c as u32);
+                let (side, w) = (gradients.side(c as u32, next), sheets.vertex_of_corner[next as usize]);
+                let change = gradients.change(v as usize, side) + gradients.change(w as usize, side);
+                (0.5 * change, 1.0 / side.length().max(1e-9))
+            }
+        };
+        let sides: Vec<(f64, f64)> = (0..sheets.vertex_of_corner.len()).into_par_iter().map(side).collect();
         let adjusted = |v: usize| {
             let present = sheets.distance[v];
             if sheets.is_on_spine(v) {
@@ -115,12 +134,12 @@ pub fn smooth<'a>(mesh: &'a TriMesh, sheets: &mut Sheets) -> Gradients<'a> {
             }
             let (mut sum, mut weights) = (0.0, 0.0);
             for &c in sheets.corners(v) {
-                for other in [following(c), preceding(c)] {
-                    let side = gradients.side(other, c);
-                    let w = sheets.vertex_of_corner[other as usize] as usize;
-                    let along = 0.5 * (gradients.change(v, side) + gradients.change(w, side));
-                    let weight = 1.0 / side.length().max(1e-9);
-                    sum += weight * (sheets.distance[w] + along);
+                let (next, last) = (following(c), preceding(c));
+                for (other, (change, weight), sign) in
+                    [(next, sides[c as usize], -1.0), (last, sides[last as usize], 1.0)]
+                {
+                    let distance = sheets.distance[sheets.vertex_of_corner[other as usize] as usize];
+                    sum += weight * (distance + sign * change);
                     weights += weight;
                 }
             }

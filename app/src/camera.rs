@@ -76,7 +76,7 @@ impl Camera {
     /// The view for an image of `size`, for the shaders.
     pub fn uniforms(&self, size: Vec2) -> ViewUniforms {
         let (near, far) = self.planes();
-        ViewUniforms::new(self.clip_from_view(aspect(size)), self.view_from_world(), near, far)
+        ViewUniforms::new(self.clip_from_view(aspect(size)), self.view_from_world(), [near, far], self.distance)
     }
 
     /// The ray through `at` in an image of `size`.

@@ -276,13 +276,30 @@ pub struct DisplaySurface {
     pub stripes: Vec<[Option<Stripes>; 2]>,
 }
 
-/// The stripe pattern of one strip on one face: lines parallel to the spine.
+/// The stripe pattern of one strip on one face: lines parallel to the spine. Lengths are those of the scene, in which the
+/// bounding box of the model has a diagonal of 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stripes {
-    /// At each corner the signed distance to the spine in units of the line spacing, positive on the left.
+    /// The strip, which determines the colour.
+    pub strip: StripId,
+    /// At each corner the signed distance to the spine, positive on the left.
     pub at: [f64; 3],
-    /// Number of lines on the left and on the right of the spine. The strip ends at the last one.
-    pub reach: [u8; 2],
+    /// By how much the distance exceeds its linear interpolation, for each side of the face from corner `i` to `i + 1`: the
+    /// distance at barycentric coordinates `w` is `Σ w_i at_i + 2 Σ w_i w_{i+1} bulge_i`. 0 for straight lines.
+    pub bulge: [f64; 3],
+    /// The width of the strip on this side of the spine. The pattern fades towards this distance.
+    pub reach: f64,
+    /// Strength of the pattern at each corner, 0 to 1: it fades where the strip is cut off or its map is distorted.
+    pub strength: [f64; 3],
+}
+
+impl Stripes {
+    /// Distance and strength at barycentric coordinates `w`.
+    pub fn sample(&self, w: [f64; 3]) -> (f64, f64) {
+        let sum = |values: [f64; 3]| (0..3).map(|i| w[i] * values[i]).sum::<f64>();
+        let bulge: f64 = (0..3).map(|i| 2.0 * w[i] * w[(i + 1) % 3] * self.bulge[i]).sum();
+        (sum(self.at) + bulge, sum(self.strength).clamp(0.0, 1.0))
+    }
 }
 
 /// How urgent the problem of a region is.
@@ -427,6 +444,20 @@ pub struct EmbeddingSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_bulge_of_a_side_is_the_excess_in_its_middle_twice() {
+        let stripes = Stripes {
+            strip: StripId(0),
+            at: [0.1, 0.3, 0.0],
+            bulge: [0.02, 0.0, 0.0],
+            reach: 1.0,
+            strength: [1.0, 0.5, 0.0],
+        };
+        let (distance, strength) = stripes.sample([0.5, 0.5, 0.0]);
+        assert!((distance - 0.21).abs() < 1e-12 && strength == 0.75);
+        assert_eq!(stripes.sample([0.0, 0.0, 1.0]), (0.0, 0.0));
+    }
 
     #[test]
     fn a_file_is_named_without_its_folder() {

@@ -5,6 +5,7 @@ pub mod cli;
 pub mod distortion;
 pub mod engine;
 pub mod input;
+pub mod palette;
 pub mod render;
 pub mod session_engine;
 pub mod shading;

@@ -2,15 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId};
-use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceVertex};
+use crate::engine::{DisplaySurface, LayoutPart, LayoutPreview, Proposal, RegionColour, Scene, StripId, Stripes};
+use crate::palette::{strip_rgb, strip_rgba};
+use crate::render::{Marker, Polyline, SurfaceMesh, SurfaceStripes, SurfaceVertex};
 
-/// Colour of placed strips.
-pub const PLACED: [u8; 4] = [0x1f, 0x5f, 0xd0, 0xff];
-/// Colour of placed strips while a layout is shown.
-const FAINT: [u8; 4] = [0x1f, 0x5f, 0xd0, 0x70];
-/// Colour of the selected strip.
-pub const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
+/// Opacity of placed strips while a layout is shown.
+const FAINT: u8 = 0x80;
+/// Colour of the selected anchor of the edited strip.
+const SELECTED: [u8; 4] = [0x0a, 0x2f, 0x8c, 0xff];
 /// Colour of the proposal that a click would place.
 pub const PROPOSED: [u8; 4] = [0x0f, 0x9d, 0x4a, 0xff];
 /// Colour of arcs.
@@ -57,20 +56,42 @@ pub fn surface(display: &DisplaySurface, tints: Option<&[[u8; 4]]>) -> SurfaceMe
             None => region(f),
         };
         let tint = tint.unwrap_or_default();
-        let stripes = display.stripes.get(f).copied().unwrap_or_default();
-        for corner in 0..3 {
-            let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
-            let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
-            vertices.push(SurfaceVertex {
-                position: position.as_vec3().to_array(),
-                normal: normal.as_vec3().to_array(),
-                tint,
-                stripe: stripes.map(|s| s.map_or(0.0, |s| s.at[corner] as f32)),
-                reach: stripes.map(|s| s.map_or([0; 2], |s| s.reach)),
-            });
-        }
+        vertices.extend(triangle(display, f, *face, tint, strip_rgb));
     }
     SurfaceMesh { vertices }
+}
+
+/// The stripes of a surface alone, in one colour, to be drawn over another surface: for a proposal.
+pub fn bands(display: &DisplaySurface, rgb: [u8; 3]) -> SurfaceMesh {
+    let striped = |f: usize| display.stripes.get(f).is_some_and(|s| s.iter().any(Option::is_some));
+    let faces = display.faces.iter().enumerate().filter(|&(f, _)| striped(f));
+    SurfaceMesh { vertices: faces.flat_map(|(f, &face)| triangle(display, f, face, [0; 4], |_| rgb)).collect() }
+}
+
+/// The three corners of face `f`. `rgb` are the colours of strips.
+fn triangle(
+    display: &DisplaySurface,
+    f: usize,
+    face: [u32; 3],
+    tint: [u8; 4],
+    rgb: impl Fn(StripId) -> [u8; 3],
+) -> [SurfaceVertex; 3] {
+    let stripes = display.stripes.get(f).copied().unwrap_or_default();
+    [0, 1, 2].map(|corner: usize| {
+        let position = display.positions.get(face[corner] as usize).copied().unwrap_or_default();
+        let normal = display.normals.get(f).map_or(DVec3::Z, |n| n[corner]);
+        let pattern = |s: Stripes| {
+            let [r, g, b] = rgb(s.strip);
+            let strength = (s.strength[corner] * 255.0).round() as u8;
+            SurfaceStripes::new(s.at[corner], s.bulge, s.reach, [r, g, b, strength])
+        };
+        SurfaceVertex {
+            position: position.as_vec3().to_array(),
+            normal: normal.as_vec3().to_array(),
+            tint,
+            stripes: stripes.map(|s| s.map(pattern).unwrap_or_default()),
+        }
+    })
 }
 
 /// Points of the surface by which the camera frames it; a sample of large surfaces.
@@ -159,13 +180,14 @@ pub fn overlay(overlay: &Overlay<'_>) -> (Vec<Polyline>, Vec<Marker>) {
     if overlay.strips {
         for strip in overlay.scene.strips.iter().filter(|s| s.visible) {
             let selected = overlay.selected == Some(strip.id) || overlay.pointed == Some(strip.id);
-            let points = points(&strip.polyline);
+            let (points, colour) = (points(&strip.polyline), strip_rgba(strip.id));
             match (selected, layout) {
-                (true, _) => outlined(&mut lines, points, strip.closed, SELECTED, 4.5),
-                (false, None) => outlined(&mut lines, points, strip.closed, PLACED, 2.6),
+                (true, _) => outlined(&mut lines, points, strip.closed, colour, 5.0),
+                (false, None) => outlined(&mut lines, points, strip.closed, colour, 2.8),
                 // Strips are faint while a layout is shown.
                 (false, Some(_)) => {
-                    lines.push(Polyline { points, closed: strip.closed, colour: FAINT, width: 1.8, hidden: 0.0 });
+                    let colour = [colour[0], colour[1], colour[2], FAINT];
+                    lines.push(Polyline { points, closed: strip.closed, colour, width: 1.8, hidden: 0.0 });
                 }
             }
         }
@@ -295,5 +317,56 @@ mod tests {
             draw_layout(&layout, None, &mut lines, &mut markers);
             assert_eq!((lines.len(), markers[0].square), (1 + usize::from(pinned), pinned));
         }
+    }
+
+    /// A square in the plane z = 0 whose left half lies in a yellow region, seen from the front.
+    fn half_yellow() -> crate::render::Frame {
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let column = |x: f64| [corner(x, -0.3), corner(x, 0.3)];
+        let display = DisplaySurface {
+            positions: [column(-0.4), column(0.0), column(0.4)].concat().into(),
+            faces: vec![[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]].into(),
+            normals: vec![[DVec3::Z; 3]; 4].into(),
+            base: vec![0, 1, 2, 3].into(),
+            regions: vec![RegionColour::Yellow, RegionColour::Yellow, RegionColour::None, RegionColour::None],
+            ..DisplaySurface::default()
+        };
+        let camera = crate::camera::Camera { yaw: 0.0, pitch: 0.0, ..Default::default() };
+        crate::render::Frame {
+            scene: crate::render::SceneInput { surface: surface(&display, None).into(), ..Default::default() },
+            view: camera.uniforms(glam::Vec2::new(160.0, 120.0)),
+            toggles: Default::default(),
+            size: [160, 120],
+            pixels_per_point: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_yellow_region_is_drawn_in_yellow() {
+        let picture = crate::render::Headless::new().unwrap().render(&half_yellow()).unwrap();
+        let [r, g, b] = [0, 1, 2].map(|i| i32::from(picture.get_pixel(60, 60)[i]));
+        // Red and green, little blue: neither orange, which has much less green than red, nor the material.
+        assert!(r > b + 50 && g > b + 40 && (r - g).abs() < 35, "{r} {g} {b}");
+        let [r, _, b] = [0, 1, 2].map(|i| i32::from(picture.get_pixel(100, 60)[i]));
+        assert!(r < b + 30, "{r} {b}");
+    }
+
+    #[test]
+    fn bands_are_the_striped_triangles_in_one_colour() {
+        let stripes =
+            |strength| Stripes { strip: StripId(4), at: [0.0, 0.1, 0.2], bulge: [0.0; 3], reach: 0.3, strength };
+        let display = DisplaySurface {
+            faces: vec![[0, 1, 2], [0, 2, 1]].into(),
+            stripes: vec![[None, None], [None, Some(stripes([1.0, 0.0, 0.5]))]],
+            ..triangle()
+        };
+        let band = bands(&display, [1, 2, 3]);
+        assert_eq!(band.vertices.len(), 3);
+        assert_eq!(
+            [0, 1, 2].map(|i| band.vertices[i].stripes[1].colour),
+            [[1, 2, 3, 255], [1, 2, 3, 0], [1, 2, 3, 128]]
+        );
+        let [r, g, b] = strip_rgb(StripId(4));
+        assert_eq!(surface(&display, None).vertices[3].stripes[1].colour, [r, g, b, 255]);
     }
 }

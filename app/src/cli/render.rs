@@ -53,6 +53,7 @@ fn frame(scene: &Scene, arguments: &RenderArguments) -> Frame {
             surface: Arc::new(shading::surface(&scene.surface, None)),
             lines: Arc::new(lines),
             markers: Arc::new(markers),
+            ..SceneInput::default()
         },
         view: camera.uniforms(size),
         toggles: Toggles { wireframe: arguments.wireframe, ..Toggles::default() },

@@ -145,9 +145,10 @@ mod tests {
 
     use super::*;
     use crate::camera::Camera;
-    use crate::render::{Marker, Polyline, SceneInput, SurfaceMesh, SurfaceVertex, Toggles};
+    use crate::render::{Marker, Polyline, SceneInput, SurfaceMesh, SurfaceStripes, SurfaceVertex, Toggles};
 
     const SIZE: [u32; 2] = [200, 160];
+    const BLUE: [u8; 4] = [20, 60, 220, 255];
 
     /// A square in the plane z = 0, with lines and markers.
     fn frame(stripes: bool, lines: Vec<Polyline>, markers: Vec<Marker>) -> Frame {
@@ -155,8 +156,7 @@ mod tests {
             position: [x, y, 0.0],
             normal: [0.0, 0.0, 1.0],
             tint: [0; 4],
-            stripe: [x * 10.0, y * 10.0],
-            reach: [[3, 3], [0, 0]],
+            stripes: [SurfaceStripes::new(f64::from(x), [0.0; 3], 0.3, BLUE), SurfaceStripes::default()],
         };
         let [a, b, c, d] = [corner(-0.4, -0.4), corner(0.4, -0.4), corner(0.4, 0.4), corner(-0.4, 0.4)];
         let camera = Camera { yaw: 0.0, pitch: 0.0, ..Camera::default() };
@@ -165,6 +165,7 @@ mod tests {
                 surface: Arc::new(SurfaceMesh { vertices: vec![a, b, c, a, c, d] }),
                 lines: Arc::new(lines),
                 markers: Arc::new(markers),
+                ..SceneInput::default()
             },
             view: camera.uniforms(Vec2::new(SIZE[0] as f32, SIZE[1] as f32)),
             toggles: Toggles { stripes, ..Toggles::default() },
@@ -225,6 +226,103 @@ mod tests {
         let blue = |p: &image::RgbaImage| p.pixels().filter(|p| p[2] > p[0].saturating_add(40)).count();
         assert_eq!(blue(&gpu.render(&frame(false, vec![], vec![])).unwrap()), 0);
         assert!(blue(&gpu.render(&frame(true, vec![], vec![])).unwrap()) > 300);
+    }
+
+    /// How blue the pixels of the middle row are.
+    fn blueness(picture: &image::RgbaImage) -> Vec<i32> {
+        let pixel = |x| picture.get_pixel(x, picture.height() / 2);
+        (0..picture.width()).map(|x| i32::from(pixel(x)[2]) - i32::from(pixel(x)[0])).collect()
+    }
+
+    /// Widths of the lines of a row, in pixels: the blueness of each in units of the largest, summed over the line.
+    fn line_widths(row: &[i32]) -> Vec<f64> {
+        let (fill, line) = (row[row.len() / 2 + 4], row.iter().copied().max().unwrap());
+        let part = |b: i32| (f64::from(b - fill) / f64::from(line - fill)).max(0.0);
+        let inside = row.iter().map(|&b| if 2 * (b - fill) > (line - fill) / 4 { part(b) } else { 0.0 });
+        let sums = inside.fold(vec![0.0], |mut sums: Vec<f64>, p| {
+            match (p > 0.0, sums.last().copied()) {
+                (true, _) => *sums.last_mut().unwrap() += p,
+                (false, Some(last)) if last > 0.0 => sums.push(0.0),
+                _ => {}
+            }
+            sums
+        });
+        sums.into_iter().filter(|&s| s > 0.0).collect()
+    }
+
+    /// The frame with the camera at this distance.
+    fn from_distance(distance: f32) -> Frame {
+        let camera = Camera { yaw: 0.0, pitch: 0.0, distance, ..Camera::default() };
+        Frame { view: camera.uniforms(Vec2::new(SIZE[0] as f32, SIZE[1] as f32)), ..frame(true, vec![], vec![]) }
+    }
+
+    #[test]
+    fn lines_of_stripes_have_the_same_width_and_about_the_same_distance_however_near_the_eye_is() {
+        let mut gpu = Headless::new().unwrap();
+        for distance in [0.35, 0.5, 0.8] {
+            let widths = line_widths(&blueness(&gpu.render(&from_distance(distance)).unwrap()));
+            // The whole row is covered by the strip; lines are 9 to 14 pixels apart.
+            assert!((12..=26).contains(&widths.len()), "{distance}: {widths:?}");
+            let inner = &widths[1..widths.len() - 1];
+            assert!(inner.iter().all(|w| (1.0..2.6).contains(w)), "{distance}: {widths:?}");
+        }
+    }
+
+    #[test]
+    fn a_strip_fades_towards_its_end() {
+        let mut gpu = Headless::new().unwrap();
+        let mut far = from_distance(0.5);
+        // The strip ends at x = 0.05. There are 517 pixels per unit of length.
+        let mut surface = (*far.scene.surface).clone();
+        for v in &mut surface.vertices {
+            v.stripes[0] = SurfaceStripes::new(f64::from(v.position[0]), [0.0; 3], 0.05, BLUE);
+        }
+        far.scene.surface = Arc::new(surface);
+        let row = blueness(&gpu.render(&far).unwrap());
+        let middle = row[100 + 4];
+        let bare = row[100 + 30];
+        assert!(middle > bare + 8, "{middle} {bare}");
+        // Between the lines, the fill gets weaker over several pixels.
+        let between: Vec<i32> = (20..=28).map(|x| row[100 + x]).collect();
+        assert!(between.iter().any(|b| (bare + 2..middle - 1).contains(b)), "{between:?}");
+    }
+
+    #[test]
+    fn bulges_bend_lines_and_a_strength_of_zero_hides_them() {
+        let mut gpu = Headless::new().unwrap();
+        let changed = |stripes: fn(f32) -> SurfaceStripes| {
+            let mut frame = from_distance(0.5);
+            let mut surface = (*frame.scene.surface).clone();
+            surface.vertices.iter_mut().for_each(|v| v.stripes[0] = stripes(v.position[0]));
+            frame.scene.surface = Arc::new(surface);
+            frame
+        };
+        let straight = gpu.render(&from_distance(0.5)).unwrap();
+        let bent = changed(|x| SurfaceStripes::new(f64::from(x), [0.02, 0.0, 0.0], 0.3, BLUE));
+        assert_ne!(gpu.render(&bent).unwrap(), straight);
+        let hidden = changed(|x| SurfaceStripes::new(f64::from(x), [0.0; 3], 0.3, [20, 60, 220, 0]));
+        let without = Frame { toggles: Toggles { stripes: false, ..Toggles::default() }, ..from_distance(0.5) };
+        assert_eq!(gpu.render(&hidden).unwrap(), gpu.render(&without).unwrap());
+    }
+
+    #[test]
+    fn bands_are_drawn_over_the_surface_without_hiding_its_stripes() {
+        let mut gpu = Headless::new().unwrap();
+        let green = |p: &image::RgbaImage| p.pixels().filter(|p| p[1] > p[0].saturating_add(30) && p[1] > p[2]).count();
+        let plain = frame(true, vec![], vec![]);
+        let mut bands = (*plain.scene.surface).clone();
+        for v in &mut bands.vertices {
+            let across = f64::from(v.position[1]);
+            v.stripes = [SurfaceStripes::default(), SurfaceStripes::new(across, [0.0; 3], 0.1, [10, 160, 70, 255])];
+        }
+        let with = SceneInput { bands: Arc::new(bands), ..plain.scene.clone() };
+        let (before, after) = (gpu.render(&plain).unwrap(), gpu.render(&Frame { scene: with, ..plain }).unwrap());
+        assert_eq!(green(&before), 0);
+        assert!(green(&after) > 200, "{}", green(&after));
+        // Rows beyond the band are as they were.
+        let row = |p: &image::RgbaImage, y| (0..SIZE[0]).map(|x| *p.get_pixel(x, y)).collect::<Vec<_>>();
+        assert_eq!(row(&before, 45), row(&after, 45));
+        assert_ne!(row(&before, 80), row(&after, 80));
     }
 
     #[test]

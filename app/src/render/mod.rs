@@ -13,4 +13,4 @@ mod target;
 
 pub use headless::{Headless, HeadlessError, render_to_png};
 pub use renderer::{Frame, Renderer};
-pub use scene::{Marker, Polyline, SceneInput, SurfaceMesh, SurfaceVertex, Toggles, ViewUniforms};
+pub use scene::{Marker, Polyline, SceneInput, SurfaceMesh, SurfaceStripes, SurfaceVertex, Toggles, ViewUniforms};

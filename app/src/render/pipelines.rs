@@ -30,13 +30,17 @@ pub struct Pipelines {
     pub view_layout: wgpu::BindGroupLayout,
     pub target_layout: wgpu::BindGroupLayout,
     pub surface: wgpu::RenderPipeline,
+    /// Stripe patterns alone, over the surface.
+    pub bands: wgpu::RenderPipeline,
     pub image: wgpu::RenderPipeline,
     pub line: wgpu::RenderPipeline,
     pub marker: wgpu::RenderPipeline,
 }
 
-const SURFACE_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
-    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32x2, 4 => Uint8x4];
+const SURFACE_ATTRIBUTES: [wgpu::VertexAttribute; 9] = wgpu::vertex_attr_array![
+    0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4,
+    3 => Float32, 4 => Snorm16x4, 5 => Unorm8x4,
+    6 => Float32, 7 => Snorm16x4, 8 => Unorm8x4];
 const SEGMENT_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
     0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Unorm8x4, 5 => Float32x2];
 const MARKER_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
@@ -48,20 +52,25 @@ impl Pipelines {
         let target_layout = target_layout(device);
         let surface_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/surface.wgsl"));
         let overlay_shader = device.create_shader_module(wgpu::include_wgsl!("../../../shaders/overlay.wgsl"));
-        let surface = pipeline(
-            device,
-            &PipelineConfig {
-                label: "surface",
-                shader: &surface_shader,
-                entries: ["vertex_main", "fragment_main"],
-                layouts: &[Some(&view_layout)],
-                buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
-                topology: wgpu::PrimitiveTopology::TriangleList,
-                colour: target::COLOUR,
-                blend: None,
-                offscreen: true,
-            },
-        );
+        let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let offscreen = |label, entries, blend| {
+            pipeline(
+                device,
+                &PipelineConfig {
+                    label,
+                    shader: &surface_shader,
+                    entries,
+                    layouts: &[Some(&view_layout)],
+                    buffer: Some(buffer::<SurfaceVertex>(wgpu::VertexStepMode::Vertex, &SURFACE_ATTRIBUTES)),
+                    topology: wgpu::PrimitiveTopology::TriangleList,
+                    colour: target::COLOUR,
+                    blend,
+                    offscreen: true,
+                },
+            )
+        };
+        let surface = offscreen("surface", ["vertex_main", "fragment_main"], None);
+        let bands = offscreen("bands", ["band_vertex", "band_fragment"], over);
         let overlay = |label, entries, buffer: Option<wgpu::VertexBufferLayout<'static>>, blend, topology| {
             pipeline(
                 device,
@@ -78,7 +87,6 @@ impl Pipelines {
                 },
             )
         };
-        let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let strip = wgpu::PrimitiveTopology::TriangleStrip;
         let segments = buffer::<SegmentInstance>(wgpu::VertexStepMode::Instance, &SEGMENT_ATTRIBUTES);
         let markers = buffer::<MarkerInstance>(wgpu::VertexStepMode::Instance, &MARKER_ATTRIBUTES);
@@ -91,7 +99,7 @@ impl Pipelines {
         );
         let line = overlay("lines", ["line_vertex", "line_fragment"], Some(segments), over, strip);
         let marker = overlay("markers", ["marker_vertex", "marker_fragment"], Some(markers), over, strip);
-        Self { view_layout, target_layout, surface, image, line, marker }
+        Self { view_layout, target_layout, surface, bands, image, line, marker }
     }
 }
 
@@ -176,7 +184,8 @@ fn pipeline(device: &wgpu::Device, config: &PipelineConfig<'_>) -> wgpu::RenderP
         primitive: wgpu::PrimitiveState { topology: config.topology, ..Default::default() },
         depth_stencil: config.offscreen.then(|| wgpu::DepthStencilState {
             format: target::DEPTH,
-            depth_write_enabled: Some(true),
+            // What is blended over the surface hides nothing.
+            depth_write_enabled: Some(config.blend.is_none()),
             depth_compare: Some(wgpu::CompareFunction::Less),
             stencil: Default::default(),
             bias: Default::default(),

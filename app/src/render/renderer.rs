@@ -28,6 +28,7 @@ pub struct Renderer {
     view_group: wgpu::BindGroup,
     target: Option<Target>,
     surface: Option<(Arc<SurfaceMesh>, Instances)>,
+    bands: Option<(Arc<SurfaceMesh>, Instances)>,
     lines: Option<(Arc<Vec<Polyline>>, Instances)>,
     markers: Option<(Arc<Vec<Marker>>, Instances)>,
     /// The view that the target shows.
@@ -82,6 +83,7 @@ impl Renderer {
             view_group,
             target: None,
             surface: None,
+            bands: None,
             lines: None,
             markers: None,
             drawn: None,
@@ -113,9 +115,9 @@ impl Renderer {
             self.target = Some(Target::new(device, &self.pipelines.target_layout, size));
             dirty = true;
         }
-        dirty |= upload(&mut self.surface, &frame.scene.surface, |old, surface| {
-            Instances::write(old, device, queue, &surface.vertices)
-        });
+        for (slot, mesh) in [(&mut self.surface, &frame.scene.surface), (&mut self.bands, &frame.scene.bands)] {
+            dirty |= upload(slot, mesh, |old, mesh| Instances::write(old, device, queue, &mesh.vertices));
+        }
         upload(&mut self.lines, &frame.scene.lines, |old, lines| {
             let segments: Vec<_> = lines.iter().flat_map(segments).collect();
             Instances::write(old, device, queue, &segments)
@@ -131,14 +133,16 @@ impl Renderer {
     }
 
     fn draw_surface(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        let (Some(target), Some((_, surface))) = (&self.target, &self.surface) else { return };
+        let Some(target) = &self.target else { return };
         let mut pass = target.begin(encoder);
         self.redraws += 1;
-        if surface.count > 0 {
-            pass.set_pipeline(&self.pipelines.surface);
-            pass.set_bind_group(0, &self.view_group, &[]);
-            pass.set_vertex_buffer(0, surface.buffer.slice(..));
-            pass.draw(0..surface.count, 0..1);
+        pass.set_bind_group(0, &self.view_group, &[]);
+        for (pipeline, mesh) in [(&self.pipelines.surface, &self.surface), (&self.pipelines.bands, &self.bands)] {
+            if let Some((_, mesh)) = mesh.as_ref().filter(|(_, m)| m.count > 0) {
+                pass.set_pipeline(pipeline);
+                pass.set_vertex_buffer(0, mesh.buffer.slice(..));
+                pass.draw(0..mesh.count, 0..1);
+            }
         }
     }
 

@@ -2,19 +2,21 @@
 //!
 //! The barycentre of each triangle of the design mesh is mapped to the proxy. The triangle takes the region and the
 //! stripes of the refined face that contains this point. Borders of regions are therefore as fine as the triangles of
-//! the design mesh; these are smaller than those of the proxy.
+//! the design mesh; these are smaller than those of the proxy. The distances of its corners from a spine are those of
+//! their own images, so that lines continue from triangle to triangle.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::dual::RefinedMesh;
+use plait_core::mesh::VertexId;
 use plait_core::proxy::Proxy;
-use plait_core::strip::StripMap;
 use plait_core::surface::{SurfacePoint, barycentric};
 use plait_core::weave::{FacePieces, Model, Session, refined_corners};
 use rayon::prelude::*;
 
-use super::{remarks, stripes};
+use super::remarks;
+use super::stripes::{Pattern, transferred};
 use crate::engine::{DisplaySurface, RegionColour, Stripes};
 
 /// The part of the display that does not depend on the strips.
@@ -51,30 +53,37 @@ impl ProxyDisplay {
         let colours: Vec<RegionColour> = woven.reports.iter().map(|r| remarks::region_colour(r.colour)).collect();
         let colour = |&f: &u32| colours[woven.arrangement.region_of_face[f as usize] as usize];
         surface.regions = piece.par_iter().map(colour).collect();
-        if let Some(map) = &woven.strip_map {
-            let visible = |curve: u32| strips.get(curve as usize).is_some_and(|s| s.visible);
-            let pattern = |(&f, corners): (&u32, &[u32; 3])| {
-                extended_stripes(map, refined, f, corners.map(|v| proxy.image_positions()[v as usize]), visible)
-            };
-            surface.stripes = piece.par_iter().zip(self.surface.faces.par_iter()).map(pattern).collect();
+        if let Some(pattern) = Pattern::of(session) {
+            let images = |v: usize| pieces.at(refined, &model.mesh, &proxy.image(VertexId::new(v)));
+            let corner_piece: Vec<u32> = (0..surface.positions.len()).into_par_iter().map(images).collect();
+            let pattern = Transfer { pattern, refined, proxy, corner_piece };
+            let faces = piece.par_iter().zip(self.surface.faces.par_iter());
+            surface.stripes = faces.map(|(&f, &corners)| pattern.on_triangle(f, corners)).collect();
         }
         surface
     }
 }
 
-/// The stripes of a refined face, extended linearly to a triangle of the design mesh whose corners have these `images`
-/// on the proxy.
-fn extended_stripes(
-    map: &StripMap,
-    refined: &RefinedMesh,
-    f: u32,
-    images: [DVec3; 3],
-    visible: impl Fn(u32) -> bool,
-) -> [Option<Stripes>; 2] {
-    [0, 1].map(|k| {
-        let (strip, distance) = stripes::covering_strip(map, f as usize, k, &visible)?;
-        let corners = refined_corners(refined, f);
-        let at = |p: DVec3| barycentric(corners, p).into_iter().zip(distance).map(|(w, d)| w * d).sum();
-        Some(stripes::stripes(strip, images.map(at)))
-    })
+/// The pattern on the refined mesh, and what transfers it to the design mesh.
+struct Transfer<'a> {
+    pattern: Pattern,
+    refined: &'a RefinedMesh,
+    proxy: &'a Proxy,
+    /// The refined face under each vertex of the design mesh.
+    corner_piece: Vec<u32>,
+}
+
+impl Transfer<'_> {
+    /// The stripes of a triangle of the design mesh with these `corners`, whose middle lies over the refined face `f`.
+    fn on_triangle(&self, f: u32, corners: [u32; 3]) -> [Option<Stripes>; 2] {
+        let weights = |f: u32, i: usize| {
+            let image = self.proxy.image_positions()[corners[i] as usize];
+            barycentric(refined_corners(self.refined, f), image)
+        };
+        let corner = |i: usize| {
+            let piece = self.corner_piece[corners[i] as usize];
+            (self.pattern.stripes[piece as usize], weights(piece, i))
+        };
+        self.pattern.stripes[f as usize].map(|s| Some(transferred(&s?, corner, |i| weights(f, i))))
+    }
 }

@@ -10,7 +10,8 @@ use plait_core::weave::Session;
 
 use super::layout_state::LayoutState;
 use super::proxy_display::ProxyDisplay;
-use super::{remarks, stripes};
+use super::remarks;
+use super::stripes::Pattern;
 use crate::engine::{Detail, DisplaySurface, ModelFacts, Scene, Strip, StripId};
 use crate::shading::corner_normals;
 use crate::texts::grouped;
@@ -93,8 +94,7 @@ fn refined_surface(normals: &[[DVec3; 3]], session: &Session) -> DisplaySurface 
         let colour = |&r: &u32| remarks::region_colour(woven.reports[r as usize].colour);
         woven.arrangement.region_of_face.iter().map(colour).collect()
     };
-    let visible = |curve: u32| session.design().strips.get(curve as usize).is_some_and(|s| s.visible);
-    let stripes = woven.strip_map.as_ref().map(|m| stripes::pattern(m, visible)).unwrap_or_default();
+    let stripes = Pattern::of(session).map(|p| p.stripes).unwrap_or_default();
     DisplaySurface {
         positions: Arc::new(refined.positions.clone()),
         base: Arc::new((0..refined.n_faces() as u32).map(|f| refined.base_face(f)).collect()),

@@ -8,7 +8,8 @@ use super::state::PlaitApp;
 use super::widgets::{card, remark_row, section, wide_button};
 use super::{detail_panel, embedding_panel, stoppable, theme};
 use crate::engine::{Scene, Strip};
-use crate::shading::{self, region_rgb};
+use crate::palette::strip_rgb;
+use crate::shading::region_rgb;
 use crate::texts::significant;
 
 /// Colour of the mark of a hidden strip.
@@ -107,9 +108,10 @@ fn strip_row(app: &PlaitApp, index: usize, strip: &Strip, ui: &mut Ui, actions: 
 
 fn strip_cells(name: &str, selected: bool, strip: &Strip, ui: &mut Ui, actions: &mut Vec<Action>) {
     let (rect, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
-    let [r, g, b, _] = if selected { shading::SELECTED } else { shading::PLACED };
+    let [r, g, b] = strip_rgb(strip.id);
     let colour = if strip.visible { Color32::from_rgb(r, g, b) } else { HIDDEN_STRIP };
-    ui.painter().rect_filled(rect.shrink2(vec2(0.0, 6.5)), 2.5, colour);
+    let height = if selected { 10.0 } else { 6.0 };
+    ui.painter().rect_filled(rect.shrink2(vec2(0.0, 0.5 * (18.0 - height))), 2.5, colour);
     ui.label(RichText::new(name).color(if strip.visible { theme::TEXT } else { theme::QUIET }));
     let kind = if strip.closed { "" } else { ", open" };
     let length = RichText::new(format!("{}{kind}", significant(strip.length, 4))).color(theme::QUIET);

@@ -174,7 +174,7 @@ fn scene_input(app: &mut PlaitApp) -> SceneInput {
     };
     let (lines, markers) = prepared.overlay(&overlay);
     app.prepared = prepared;
-    SceneInput { surface, lines, markers }
+    SceneInput { surface, lines, markers, ..SceneInput::default() }
 }
 
 /// Shows "2 of 9" beside the pointer, or why no strip passes the anchors.

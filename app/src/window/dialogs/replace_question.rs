@@ -1,6 +1,6 @@
 //! The question whether files are replaced.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::asked::Asked;
 
@@ -74,8 +74,8 @@ impl ReplaceQuestion {
     }
 }
 
-fn name(file: &PathBuf) -> String {
-    file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+fn name(file: impl AsRef<Path>) -> String {
+    file.as_ref().file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -56,6 +56,10 @@ fn wait(window: &mut Window, done: impl Fn(&PlaitApp) -> bool) {
     window.run_steps(2);
 }
 
+fn until_idle(window: &mut Window) {
+    wait(window, |app| app.is_idle());
+}
+
 fn hover(window: &mut Window, at: egui::Pos2) {
     window.hover_at(at);
     wait(window, |app| app.offered().0 > 0);

@@ -327,6 +327,8 @@ pub struct Strip {
     pub closed: bool,
     /// Length of the spine, in units of the file.
     pub length: f64,
+    /// Elastica cost of the loop as it was found.
+    pub cost: f64,
     /// Whether it is shown.
     pub visible: bool,
     /// The anchors that it was placed through; none if it was not placed by hand.

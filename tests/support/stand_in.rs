@@ -177,6 +177,7 @@ impl Engine for Session {
             polyline: Vec::new(),
             closed: true,
             length: 1.0,
+            cost: 1.0,
             visible: true,
             anchors: Vec::new(),
         };

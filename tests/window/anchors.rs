@@ -4,7 +4,7 @@ use egui::{Modifiers, PointerButton, Pos2, pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use plait_app::engine::{Strip, StripId};
 
-use super::{FRONT, Window, click, hover, open, strips, wait};
+use super::{FRONT, Window, click, hover, open, strips, until_idle, wait, wheel};
 
 fn button(window: &mut Window, pos: Pos2, button: PointerButton, pressed: bool, modifiers: Modifiers) {
     window.event(egui::Event::PointerButton { pos, button, pressed, modifiers });
@@ -21,7 +21,7 @@ fn drag(window: &mut Window, from: Pos2, to: Pos2) {
         window.step();
     }
     button(window, to, PointerButton::Primary, false, Modifiers::NONE);
-    settle(window);
+    until_idle(window);
 }
 
 fn shift_click(window: &mut Window, at: Pos2) {
@@ -30,16 +30,12 @@ fn shift_click(window: &mut Window, at: Pos2) {
     for pressed in [true, false] {
         button(window, at, PointerButton::Primary, pressed, Modifiers::SHIFT);
     }
-    settle(window);
-}
-
-fn settle(window: &mut Window) {
-    wait(window, |app| app.is_idle());
+    until_idle(window);
 }
 
 fn key(window: &mut Window, key: egui::Key) {
     window.key_press(key);
-    settle(window);
+    until_idle(window);
 }
 
 fn anchors(window: &Window) -> usize {
@@ -92,13 +88,13 @@ fn anchors_are_added_taken_back_and_the_strip_is_dropped() {
     assert_eq!(anchors(&window), 1);
     let there = FRONT + vec2(-90.0, 8.0);
     click(&mut window, there);
-    settle(&mut window);
+    until_idle(&mut window);
     drag(&mut window, FRONT + vec2(90.0, 6.0), FRONT + vec2(130.0, 2.0));
     assert_eq!(anchors(&window), 3);
     assert!(window.state().anchors().unwrap()[2].direction.is_some());
     for left in [2, 1, 0] {
         window.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
-        settle(&mut window);
+        until_idle(&mut window);
         assert_eq!(anchors(&window), left);
     }
     shift_click(&mut window, FRONT);
@@ -116,10 +112,17 @@ fn anchors_and_the_spine_are_dragged_and_anchors_are_removed() {
     drag(&mut window, FRONT, FRONT + vec2(0.0, -12.0));
     let moved = window.state().anchors().unwrap().to_vec();
     assert!(moved.len() == 1 && moved[0].at != before[0].at && moved[0].direction.is_some());
-    // The spine, pulled at another place.
+    // The spine, dragged at another place.
     let proposal = window.state().shown().unwrap().clone();
-    let spine =
-        Strip { id: StripId(0), polyline: proposal, closed: true, length: 0.0, visible: true, anchors: Vec::new() };
+    let spine = Strip {
+        id: StripId(0),
+        polyline: proposal,
+        closed: true,
+        length: 0.0,
+        cost: 0.0,
+        visible: true,
+        anchors: Vec::new(),
+    };
     let grabbed = far_point(&window, &spine, FRONT);
     drag(&mut window, grabbed, grabbed + vec2(0.0, 14.0));
     assert_eq!(anchors(&window), 2);
@@ -137,10 +140,10 @@ fn a_placed_strip_is_selected_edited_and_replaced_as_one_step() {
     let placed = strip(&window, 0);
     let on_it = far_point(&window, &placed, pos2(0.0, 0.0));
     window.hover_at(on_it);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(window.state().offered().0, 0, "nothing is proposed over a placed strip");
     click(&mut window, on_it);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(window.state().selected(), Some(placed.id));
     assert_eq!(strips(&window), 1);
     // Escape leaves it as it was.
@@ -155,8 +158,32 @@ fn a_placed_strip_is_selected_edited_and_replaced_as_one_step() {
     let replaced = strip(&window, 0);
     assert!(replaced.id == placed.id && replaced.polyline != placed.polyline && strips(&window) == 1);
     window.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(strip(&window, 0), placed);
+}
+
+#[test]
+fn an_alternative_that_was_placed_is_shown_when_it_is_edited() {
+    let mut window = open("creature");
+    let at = pos2(420.0, 360.0);
+    hover(&mut window, at);
+    until_idle(&mut window);
+    wheel(&mut window, -1.0);
+    assert_eq!(window.state().offered().1, 1);
+    let spine = window.state().shown().unwrap().clone();
+    click(&mut window, at);
+    wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == 1));
+    let id = strip(&window, 0).id;
+    window.get_by_label("Select Strip 1").click();
+    window.run_steps(4);
+    assert_eq!(window.state().selected(), Some(id));
+    key(&mut window, egui::Key::E);
+    assert_eq!(window.state().shown(), Some(&spine));
+    // Once an anchor is added, the best strip through the anchors is shown.
+    assert!(window.state().offered().1 > 0);
+    click(&mut window, at + vec2(40.0, 10.0));
+    until_idle(&mut window);
+    assert_eq!(window.state().offered().1, 0);
 }
 
 #[test]
@@ -170,7 +197,7 @@ fn a_double_click_edits_a_strip() {
     window.run_steps(60);
     click(&mut window, on_it);
     click(&mut window, on_it);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(anchors(&window), 1);
     window.get_by_label_contains("Escape: drop it");
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::{Modifiers, pos2};
 use egui_kittest::kittest::Queryable as _;
 
-use super::{FRONT, Window, click, hover, open, strips, wait};
+use super::{FRONT, Window, click, hover, open, strips, until_idle, wait};
 
 /// A window on a torus, without dialogs of the system.
 fn window() -> Window {
@@ -49,10 +49,6 @@ fn double_click(window: &mut Window, pos: egui::Pos2) {
     window.run_steps(4);
 }
 
-fn settle(window: &mut Window) {
-    wait(window, |app| app.is_idle());
-}
-
 fn shows(window: &Window, text: &str) -> bool {
     window.query_by_label_contains(text).is_some()
 }
@@ -64,7 +60,7 @@ fn a_design_is_saved_beside_a_mesh_of_that_name() {
     std::fs::write(&mesh, "v 0 0 0\n").unwrap();
     let mut window = window();
     type_name(&mut window, egui::Key::S, &mesh);
-    settle(&mut window);
+    until_idle(&mut window);
     assert!(shows(&window, "Saved "));
     assert_eq!(std::fs::read_to_string(&mesh).unwrap(), "v 0 0 0\n");
     let saved = folder.path().join("bunny.obj.plait");
@@ -77,7 +73,7 @@ fn a_design_is_replaced_only_after_a_question() {
     let path = folder.path().join("a.plait");
     let mut window = window();
     type_name(&mut window, egui::Key::S, &folder.path().join("a"));
-    settle(&mut window);
+    until_idle(&mut window);
     let first = std::fs::read_to_string(&path).unwrap();
     place_strip(&mut window);
 
@@ -98,7 +94,7 @@ fn a_design_is_replaced_only_after_a_question() {
     type_name(&mut window, egui::Key::S, &path);
     window.get_by_label("Replace").click();
     window.run_steps(4);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(plait_core::weave::Design::read(&path).unwrap().strips.len(), 1);
 }
 
@@ -111,7 +107,7 @@ fn a_file_that_is_no_design_is_kept_whatever_its_name_is() {
     type_name(&mut window, egui::Key::S, &path);
     window.get_by_label("Replace").click();
     window.run_steps(4);
-    settle(&mut window);
+    until_idle(&mut window);
     assert!(shows(&window, "notes.plait is no Plait design"));
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "to do");
 }
@@ -130,7 +126,7 @@ fn an_export_replaces_its_own_files_after_a_question_and_no_others() {
         wait(&mut window, |app| app.scene().is_some_and(|s| s.strips.len() == round));
     }
     type_name(&mut window, egui::Key::E, &out);
-    settle(&mut window);
+    until_idle(&mut window);
     assert!(shows(&window, "Exported to"));
     let first = std::fs::read_to_string(&quads).unwrap();
     assert!(first.starts_with("# Plait: "));
@@ -139,14 +135,14 @@ fn an_export_replaces_its_own_files_after_a_question_and_no_others() {
     assert!(shows(&window, "Replace 6 files?"));
     window.get_by_label("Replace").click();
     window.run_steps(4);
-    settle(&mut window);
+    until_idle(&mut window);
     assert_eq!(std::fs::read_to_string(&quads).unwrap(), first);
 
     std::fs::write(&quads, "v 0 0 0\n").unwrap();
     type_name(&mut window, egui::Key::E, &out);
     window.get_by_label("Replace").click();
     window.run_steps(4);
-    settle(&mut window);
+    until_idle(&mut window);
     assert!(shows(&window, "quads.obj is no mesh written by Plait"));
     assert_eq!(std::fs::read_to_string(&quads).unwrap(), "v 0 0 0\n");
 }

@@ -1,12 +1,13 @@
 //! Makes the scenes that the window shows of a session.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use glam::DVec3;
 use plait_core::dual::RefinedMesh;
 use plait_core::mesh::{FaceId, TriMesh};
 use plait_core::surface::barycentric_inside;
-use plait_core::weave::Session;
+use plait_core::weave::{Session, Woven};
 
 use super::layout_state::LayoutState;
 use super::proxy_display::ProxyDisplay;
@@ -20,6 +21,14 @@ use crate::texts::grouped;
 pub(super) struct ModelSnapshot {
     facts: Arc<ModelFacts>,
     display: ModelDisplay,
+    latest: RefCell<Option<LatestSurface>>,
+}
+
+/// The surface of the latest scene, with what it depends on. Pins and embeddings do not change it, and its stripes take long.
+struct LatestSurface {
+    woven: Arc<Woven>,
+    visible: Vec<bool>,
+    surface: Arc<DisplaySurface>,
 }
 
 /// How the design mesh is displayed.
@@ -40,7 +49,7 @@ impl ModelSnapshot {
             Some(_) => ModelDisplay::Proxy(ProxyDisplay::new(model, faces, normals)),
             None => ModelDisplay::Direct(normals),
         };
-        Self { facts: Arc::new(facts(session)), display }
+        Self { facts: Arc::new(facts(session)), display, latest: RefCell::default() }
     }
 
     /// The present state of `session`.
@@ -52,6 +61,7 @@ impl ModelSnapshot {
             polyline: s.curve.points(&model.loaded.mesh),
             closed: s.curve.closed,
             length: s.curve.length(&model.loaded.mesh) * model.loaded.units.scale,
+            cost: s.cost,
             visible: s.visible,
             anchors: s.anchors.clone(),
         });
@@ -59,7 +69,7 @@ impl ModelSnapshot {
             model: Arc::clone(&self.facts),
             design_mesh: Arc::clone(&model.loaded.mesh),
             index: Arc::clone(&model.index),
-            surface: Arc::new(self.surface(session)),
+            surface: self.surface(session),
             strips: strips.collect(),
             remarks: remarks::remarks(session),
             summary,
@@ -72,7 +82,20 @@ impl ModelSnapshot {
         }
     }
 
-    fn surface(&self, session: &Session) -> DisplaySurface {
+    fn surface(&self, session: &Session) -> Arc<DisplaySurface> {
+        let visible: Vec<bool> = session.design().strips.iter().map(|s| s.visible).collect();
+        let mut latest = self.latest.borrow_mut();
+        if let Some(latest) = latest.as_ref().filter(|l| Arc::ptr_eq(&l.woven, session.woven()) && l.visible == visible)
+        {
+            return Arc::clone(&latest.surface);
+        }
+        let surface = Arc::new(self.new_surface(session));
+        let woven = Arc::clone(session.woven());
+        *latest = Some(LatestSurface { woven, visible, surface: Arc::clone(&surface) });
+        surface
+    }
+
+    fn new_surface(&self, session: &Session) -> DisplaySurface {
         match (&self.display, &session.model().proxy) {
             (ModelDisplay::Proxy(display), Some(proxy)) => display.surface(session, proxy),
             (ModelDisplay::Proxy(_), None) => DisplaySurface::default(),

@@ -12,6 +12,9 @@ pub struct Editing {
     anchors: Vec<Anchor>,
     /// The placed strip that is edited.
     replaces: Option<StripId>,
+    /// The elastica cost of that strip, until its anchors are changed: of the strips through its anchors it is the one to be
+    /// shown.
+    placed_cost: Option<f64>,
     /// The anchors before each change, the last one on top.
     former: Vec<Vec<Anchor>>,
     /// The anchor selected.
@@ -26,9 +29,14 @@ impl Editing {
         Self { anchors: vec![anchor], selected: Some(0), ..Self::default() }
     }
 
-    /// A placed strip with its anchors.
-    pub fn of_strip(strip: StripId, anchors: Vec<Anchor>) -> Self {
-        Self { anchors, replaces: Some(strip), ..Self::default() }
+    /// A placed strip with its anchors and its elastica cost.
+    pub fn of_strip(strip: StripId, anchors: Vec<Anchor>, cost: f64) -> Self {
+        Self { anchors, replaces: Some(strip), placed_cost: Some(cost), ..Self::default() }
+    }
+
+    /// The elastica cost of the placed strip, while its anchors are as they were.
+    pub fn placed_cost(&self) -> Option<f64> {
+        self.placed_cost
     }
 
     /// The anchors in order.
@@ -48,6 +56,7 @@ impl Editing {
 
     /// Begins a change that can be taken back.
     pub fn begin_change(&mut self) {
+        self.placed_cost = None;
         self.former.push(self.anchors.clone());
     }
 

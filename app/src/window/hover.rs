@@ -5,6 +5,10 @@ use plait_core::surface::SurfacePoint;
 
 use crate::engine::{LayoutPart, Proposal, StripId};
 
+/// Relative difference up to which two elastica costs are those of one loop: both sum the same single-precision numbers, but
+/// in another order.
+const SAME_COST: f64 = 1e-5;
+
 /// A part of the edited strip that can be dragged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Grip {
@@ -47,19 +51,28 @@ impl Hover {
         self.proposals.get(self.chosen)
     }
 
-    /// Takes in a reply. Returns the proposal that is to be placed at once, if a click came before the reply.
-    pub fn arrived(&mut self, generation: u64, proposals: Vec<Proposal>, complete: bool) -> Option<Proposal> {
-        if self.generation != Some(generation) {
+    /// Takes in a reply, and shows the proposal of elastica cost `placed` if there is one, else the best. Returns the proposal
+    /// that is to be placed at once, if a click came before the reply.
+    pub fn arrived(
+        &mut self,
+        generation: u64,
+        proposals: Vec<Proposal>,
+        complete: bool,
+        placed: Option<f64>,
+    ) -> Option<Proposal> {
+        // The best one comes first, and would be shown for a moment in place of the placed one.
+        if self.generation != Some(generation) || (placed.is_some() && !complete) {
             return None;
         }
+        let is_placed = |p: &Proposal| placed.is_some_and(|cost| (p.cost - cost).abs() <= SAME_COST * cost);
+        self.chosen = proposals.iter().position(is_placed).unwrap_or(0);
         self.proposals = proposals;
-        self.chosen = 0;
         if !complete {
             return None;
         }
         self.generation = None;
         let place = std::mem::take(&mut self.place_on_arrival);
-        self.proposals.first().filter(|_| place).cloned()
+        self.shown().filter(|_| place).cloned()
     }
 
     /// Drops the proposals and the request.
@@ -89,17 +102,29 @@ mod tests {
     #[test]
     fn replies_to_older_requests_are_ignored() {
         let mut hover = Hover { generation: Some(2), ..Hover::default() };
-        assert!(hover.arrived(1, vec![proposal(1.0)], true).is_none() && hover.proposals.is_empty());
-        hover.arrived(2, vec![proposal(1.0)], true);
+        assert!(hover.arrived(1, vec![proposal(1.0)], true, None).is_none() && hover.proposals.is_empty());
+        hover.arrived(2, vec![proposal(1.0)], true, None);
         assert_eq!(hover.proposals.len(), 1);
     }
 
     #[test]
     fn an_early_click_places_the_best_proposal_once_it_is_known() {
         let mut hover = Hover { generation: Some(1), place_on_arrival: true, ..Hover::default() };
-        assert_eq!(hover.arrived(1, vec![proposal(2.0)], false), None);
-        assert_eq!(hover.arrived(1, vec![proposal(1.0)], true).map(|p| p.cost), Some(1.0));
+        assert_eq!(hover.arrived(1, vec![proposal(2.0)], false, None), None);
+        assert_eq!(hover.arrived(1, vec![proposal(1.0)], true, None).map(|p| p.cost), Some(1.0));
         assert!(!hover.place_on_arrival);
+    }
+
+    #[test]
+    fn of_the_proposals_through_the_anchors_of_a_strip_the_placed_one_is_shown() {
+        let mut hover = Hover { generation: Some(1), ..Hover::default() };
+        hover.arrived(1, vec![proposal(1.0)], false, Some(2.0));
+        assert!(hover.shown().is_none(), "the best is not shown meanwhile");
+        hover.arrived(1, vec![proposal(1.0), proposal(2.000_001)], true, Some(2.0));
+        assert_eq!(hover.chosen, 1);
+        hover.generation = Some(2);
+        hover.arrived(2, vec![proposal(1.0), proposal(2.0)], true, Some(1.5));
+        assert_eq!(hover.chosen, 0);
     }
 
     #[test]

@@ -167,7 +167,7 @@ fn place(app: &mut PlaitApp, at: Vec2) {
     }
 }
 
-/// Begins to drag: an anchor is moved or turned, the spine is pulled by a new anchor, or a directional anchor is set.
+/// Begins to drag: an anchor is moved or turned, the spine gets a new anchor, or a directional anchor is set.
 fn grab(app: &mut PlaitApp, at: Vec2) {
     let grip = app.hover.grip;
     let point = app.pick(at);
@@ -248,14 +248,14 @@ impl PlaitApp {
     pub(super) fn edit_strip(&mut self, strip: StripId, at: Option<SurfacePoint>) {
         let Some(scene) = &self.scene else { return };
         let Some(placed) = scene.strips.iter().find(|s| s.id == strip) else { return };
-        let mut anchors = placed.anchors.clone();
+        let (mut anchors, cost) = (placed.anchors.clone(), placed.cost);
         if anchors.is_empty() {
             let middle = || placed.polyline.get(placed.polyline.len() / 2).map(|&p| scene.index.nearest(p));
             anchors.extend(at.or_else(middle).map(Anchor::point));
         }
         if !anchors.is_empty() {
             self.selected = Some(strip);
-            self.edit(Editing::of_strip(strip, anchors));
+            self.edit(Editing::of_strip(strip, anchors, cost));
         }
     }
 

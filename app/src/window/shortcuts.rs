@@ -39,7 +39,7 @@ const SHORTCUTS: [(&str, &[(&str, &str)]); 5] = [
         "Editing a strip",
         &[
             ("Click, drag elsewhere", "add an anchor, add one with a direction"),
-            ("Drag an anchor, one of its ends, the spine", "move it, turn it, pull the spine by a new anchor"),
+            ("Drag an anchor, one of its ends, the spine", "move it, turn it, move the spine by a new anchor"),
             ("Delete", "remove the selected anchor"),
             ("Wheel", "show other strips through the anchors"),
             ("Click on the spine, Enter", "place the strip"),

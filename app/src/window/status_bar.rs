@@ -52,7 +52,7 @@ fn editing_hint(app: &PlaitApp) -> &'static str {
         _ if app.input.is_grabbing() => "Let go to keep editing · Enter: place the strip · Escape: drop it",
         Some(Grip::Anchor(_)) => "Drag: move this anchor · Click, Delete: remove it · Enter: place the strip",
         Some(Grip::Tip(..)) => "Drag: turn the direction of this anchor · Enter: place the strip",
-        Some(Grip::Spine(_)) => "Click: place this strip · Drag: pull it by a new anchor · Wheel: other strips",
+        Some(Grip::Spine(_)) => "Click: place this strip · Drag: move it by a new anchor · Wheel: other strips",
         None => "Click: add an anchor · Drag: add one with a direction · Enter: place the strip · Escape: drop it",
     }
 }

@@ -14,7 +14,7 @@ pub const LINE: Color32 = Color32::from_rgb(0xdf, 0xdc, 0xd6);
 pub const TEXT: Color32 = Color32::from_rgb(0x1d, 0x1f, 0x23);
 /// Secondary text.
 pub const QUIET: Color32 = Color32::from_rgb(0x63, 0x66, 0x6c);
-/// The accent colour, also that of placed strips.
+/// The accent colour.
 pub const ACCENT: Color32 = Color32::from_rgb(0x1f, 0x5f, 0xd0);
 /// Background of selected items.
 pub const ACCENT_WASH: Color32 = Color32::from_rgb(0xe3, 0xec, 0xfb);

@@ -159,10 +159,10 @@ impl Session {
             return Ok(if apart { NoLoop::Apart } else { NoLoop::Turns });
         }
         let strips = &self.design().strips;
-        for (i, strip) in strips.iter().enumerate().filter(|(_, s)| Some(s.id) != replaces) {
+        for i in (0..strips.len()).filter(|&i| Some(strips[i].id) != replaces) {
             let others = |j: usize| j != i && Some(strips[j].id) != replaces;
             if passes(&mask_spines(self.model(), strips, others))? {
-                return Ok(NoLoop::Blocked(strip.id));
+                return Ok(NoLoop::Blocked(i));
             }
         }
         Ok(NoLoop::BlockedBySeveral)
@@ -254,17 +254,20 @@ mod tests {
     }
 
     #[test]
-    fn the_strip_that_blocks_is_named() {
+    fn the_strip_that_blocks_is_named_by_its_place_in_the_list() {
         let mut session = torus();
         let progress = Progress::new();
         let p = session.model().mesh.positions()[100];
         let anchor = Anchor::point(at(&session, p));
         let proposal = through(&mut session, &[anchor], None).remove(0);
-        let id = session.place(proposal, &progress).unwrap();
+        let first = session.place(proposal.clone(), &progress).unwrap();
+        session.remove(first, &progress).unwrap();
+        // Its identifier is no longer its place.
+        let second = session.place(proposal, &progress).unwrap();
+        assert_ne!(second, first);
         assert_eq!(session.woven().mask, session.woven().mask_of(session.model(), &session.design().strips, |_| true));
-        // With every direction at the anchor closed by the strip there is no loop; without the strip there is one.
         let why = session.why_no_loop(&[anchor], None, &progress).unwrap();
-        assert_eq!(why, NoLoop::Blocked(id));
+        assert_eq!(why, NoLoop::Blocked(0));
         assert!(why.to_string().starts_with("strip 1 "), "{why}");
     }
 }

@@ -99,9 +99,9 @@ pub enum WeaveError {
 /// Why no strip passes all anchors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NoLoop {
-    /// It would run along a placed strip.
-    #[error("strip {} runs there already; edit or remove it, or move an anchor", .0.0 + 1)]
-    Blocked(StripId),
+    /// It would run along a placed strip, given by its place in the list of strips, from 0.
+    #[error("strip {} runs there already; edit or remove it, or move an anchor", .0 + 1)]
+    Blocked(usize),
     /// It would run along several placed strips.
     #[error("placed strips run there already; edit or remove them, or move an anchor")]
     BlockedBySeveral,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::sheet::{NONE, Sheets, following, preceding};
 
-/// Rounds of smoothing. More would pull lines off the map; none leaves the noise of coarse meshes. Chosen by hand.
+/// Rounds of smoothing. More would move lines off the map; none leaves the noise of coarse meshes. Chosen by hand.
 const ROUNDS: usize = 8;
 /// Part of the way to the predicted distance in each round; 1 would oscillate. Chosen by hand.
 const STEP: f64 = 0.6;

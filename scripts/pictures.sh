@@ -67,7 +67,22 @@ place() {
     settle
 }
 
+# Drags from a place to another, and lets go there.
+drag() {
+    xdotool mousemove "$1" "$2" mousedown 1
+    for k in 1 2 3 4 5 6; do
+        xdotool mousemove "$(($1 + ($3 - $1) * k / 6))" "$(($2 + ($4 - $2) * k / 6))" sleep 0.1
+    done
+    xdotool mouseup 1
+    settle
+}
+
 open creature
+drag 525 432 597 396
+drag 400 455 320 460
+picture anchors
+xdotool key Escape
+settle
 point 530 480
 picture hover
 xdotool click 5

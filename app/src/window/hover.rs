@@ -3,6 +3,7 @@
 use glam::Vec2;
 use plait_core::surface::SurfacePoint;
 
+use super::editing::Editing;
 use crate::engine::{LayoutPart, Proposal, StripId};
 
 /// Relative difference up to which two elastica costs are those of one loop: both sum the same single-precision numbers, but
@@ -39,6 +40,8 @@ pub struct Hover {
     pub chosen: usize,
     /// The position of the latest placement or choice. Small movements from there request no new proposals.
     pub calm_at: Option<Vec2>,
+    /// Whether the proposal shown can be placed: it answers the latest request and is known to be the best.
+    pub placeable: bool,
     /// Whether a click came before the reply: the best proposal is then placed when it arrives.
     pub place_on_arrival: bool,
     /// The position of the latest request.
@@ -51,15 +54,16 @@ impl Hover {
         self.proposals.get(self.chosen)
     }
 
-    /// Takes in a reply, and shows the proposal of elastica cost `placed` if there is one, else the best. Returns the proposal
-    /// that is to be placed at once, if a click came before the reply.
+    /// Takes in a reply, and shows the best proposal, or that of a placed strip which is edited. Returns the proposal that is to
+    /// be placed at once, if a click came before the reply.
     pub fn arrived(
         &mut self,
         generation: u64,
         proposals: Vec<Proposal>,
         complete: bool,
-        placed: Option<f64>,
+        editing: Option<&Editing>,
     ) -> Option<Proposal> {
+        let placed = editing.and_then(Editing::placed_cost);
         // The best one comes first, and would be shown for a moment in place of the placed one.
         if self.generation != Some(generation) || (placed.is_some() && !complete) {
             return None;
@@ -67,10 +71,14 @@ impl Hover {
         let is_placed = |p: &Proposal| placed.is_some_and(|cost| (p.cost - cost).abs() <= SAME_COST * cost);
         self.chosen = proposals.iter().position(is_placed).unwrap_or(0);
         self.proposals = proposals;
-        if !complete {
+        if complete {
+            self.generation = None;
+        }
+        // The first of the strips through anchors is known to be the best; the first through a point need not be.
+        self.placeable = complete || editing.is_some();
+        if !self.placeable {
             return None;
         }
-        self.generation = None;
         let place = std::mem::take(&mut self.place_on_arrival);
         self.shown().filter(|_| place).cloned()
     }
@@ -117,14 +125,22 @@ mod tests {
 
     #[test]
     fn of_the_proposals_through_the_anchors_of_a_strip_the_placed_one_is_shown() {
+        let of_cost = |cost| Editing::of_strip(StripId(0), Vec::new(), cost);
         let mut hover = Hover { generation: Some(1), ..Hover::default() };
-        hover.arrived(1, vec![proposal(1.0)], false, Some(2.0));
+        hover.arrived(1, vec![proposal(1.0)], false, Some(&of_cost(2.0)));
         assert!(hover.shown().is_none(), "the best is not shown meanwhile");
-        hover.arrived(1, vec![proposal(1.0), proposal(2.000_001)], true, Some(2.0));
+        hover.arrived(1, vec![proposal(1.0), proposal(2.000_001)], true, Some(&of_cost(2.0)));
         assert_eq!(hover.chosen, 1);
         hover.generation = Some(2);
-        hover.arrived(2, vec![proposal(1.0), proposal(2.0)], true, Some(1.5));
+        hover.arrived(2, vec![proposal(1.0), proposal(2.0)], true, Some(&of_cost(1.5)));
         assert_eq!(hover.chosen, 0);
+    }
+
+    #[test]
+    fn the_first_strip_through_anchors_is_placed_without_waiting_for_alternatives() {
+        let editing = Editing::default();
+        let mut hover = Hover { generation: Some(1), place_on_arrival: true, ..Hover::default() };
+        assert_eq!(hover.arrived(1, vec![proposal(1.0)], false, Some(&editing)).map(|p| p.cost), Some(1.0));
     }
 
     #[test]

@@ -263,6 +263,7 @@ impl PlaitApp {
     pub(super) fn search_edited(&mut self) {
         if let Some(editing) = &mut self.editing {
             editing.problem = None;
+            (self.hover.placeable, self.hover.place_on_arrival) = (false, false);
             self.hover.generation = Some(self.worker.search(editing.search()));
         }
     }
@@ -270,8 +271,8 @@ impl PlaitApp {
     /// Places the strip that is edited, or as soon as it is found.
     pub(super) fn place_edited(&mut self) {
         let Some(editing) = &self.editing else { return };
-        if self.hover.generation.is_some() {
-            self.hover.place_on_arrival = true;
+        if !self.hover.placeable {
+            self.hover.place_on_arrival = self.hover.generation.is_some();
         } else if let (Some(proposal), None) = (self.hover.shown().cloned(), &editing.problem) {
             let replaces = editing.replaces();
             self.stop_editing();

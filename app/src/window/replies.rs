@@ -31,8 +31,8 @@ impl PlaitApp {
                     self.scene = Some(scene);
                 }
                 Reply::Proposals { generation, proposals, complete } => {
-                    let placed = self.editing.as_ref().and_then(Editing::placed_cost);
-                    if let Some(proposal) = self.hover.arrived(generation, proposals, complete, placed) {
+                    let editing = self.editing.as_ref();
+                    if let Some(proposal) = self.hover.arrived(generation, proposals, complete, editing) {
                         let replaces = self.editing.as_ref().and_then(Editing::replaces);
                         self.stop_editing();
                         self.worker.request(Job::Place(proposal, replaces));

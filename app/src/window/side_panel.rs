@@ -45,7 +45,7 @@ pub fn show(app: &PlaitApp, scene: &Scene, ui: &mut Ui, actions: &mut Vec<Action
     }
     section(ui, &format!("Strips · {}", scene.strips.len()));
     if scene.strips.is_empty() {
-        let hint = "Point at the surface. Wheel: other strips. Click: place the strip.";
+        let hint = "Point at the surface. Wheel: other strips. Click: place the strip. Drag: set its direction.";
         ui.label(RichText::new(hint).color(theme::QUIET));
     }
     ui.spacing_mut().item_spacing.y = 2.0;

@@ -11,10 +11,10 @@
 //! 3. With the cost to go as potential, an A* search per start direction closes the loop with that direction. If no loop
 //!    is below the limit, the limit is increased.
 //!
-//! The start is the anchor with the fewest directions. If all anchors have a direction, step 1 gives the exact cost.
+//! The start is the anchor with the fewest directions.
 //!
-//! Alternatives are the cheapest loops of each direction in which an anchor without direction can be left: steps 2 and 3 for
-//! each such anchor as the start.
+//! Alternatives are the cheapest loops of each direction in which an anchor can be left: steps 2 and 3 for each anchor as the
+//! start.
 //!
 //! The thesis runs Dijkstra's algorithm per pair of directions instead, and searches a graph of their distances.
 
@@ -31,7 +31,7 @@ use super::workspace::SearchWorkspace;
 use crate::mesh::VertexId;
 use crate::progress::{Cancelled, Progress};
 
-/// First limit as a multiple of the lower bound; the excess allows for turns at anchors without direction. Chosen by hand.
+/// First limit as a multiple of the lower bound; the excess allows for turns at anchors. Chosen by hand.
 const FIRST_LIMIT: f32 = 1.1;
 
 /// Factor by which the limit increases when no loop is below it. Chosen by hand.
@@ -42,7 +42,8 @@ const LIMIT_GROWTH: f32 = 1.3;
 pub struct Anchor {
     /// The vertex.
     pub vertex: VertexId,
-    /// The direction, of any length; the open geodesic nearest to it is used. `None`: any direction.
+    /// The direction, of any length; the loop leaves the vertex by the open geodesic nearest to it or to its opposite: a strip
+    /// has no orientation. `None`: any direction.
     pub direction: Option<DVec3>,
 }
 
@@ -65,13 +66,25 @@ impl<'a> AnchorQuery<'a> {
         Self { anchors, mask, selection: Selection::cheapest(), budget: 20_000_000 }
     }
 
-    /// The cheapest loop, and alternatives in other directions at the anchors without direction.
+    /// The cheapest loop, and alternatives in other directions at the anchors.
     pub fn alternatives(anchors: &'a [Anchor], mask: &'a DirectionMask) -> Self {
         Self { selection: Selection::alternatives(), budget: 60_000_000, ..Self::cheapest(anchors, mask) }
     }
 }
 
 impl ElasticaGraph {
+    /// The states by which a loop may leave an anchor (ξᵢ in the thesis, where a direction gives one state), sorted.
+    pub(super) fn departures(&self, mask: &DirectionMask, anchor: &Anchor) -> Vec<State> {
+        let Some(direction) = anchor.direction else {
+            return self.outgoing(anchor.vertex).filter(|&e| mask.is_open(e)).collect();
+        };
+        let nearest = |d| self.nearest_open(mask, anchor.vertex, d);
+        let mut states: Vec<State> = [direction, -direction].into_iter().filter_map(nearest).collect();
+        states.sort_unstable();
+        states.dedup();
+        states
+    }
+
     /// The cheapest loops through all anchors in order. On open surfaces the cheapest may instead be a curve from boundary
     /// to boundary that passes them in order. `watch` is called with the cheapest when it is proved, before alternatives
     /// are searched.
@@ -151,14 +164,7 @@ impl<'a> AnchoredSearch<'a> {
         budget: &mut SearchBudget,
     ) -> Result<Option<Self>, Stop> {
         let mask = query.mask;
-        let mut departures: Vec<Vec<State>> = query
-            .anchors
-            .iter()
-            .map(|a| match a.direction {
-                Some(d) => graph.nearest_open(mask, a.vertex, d).into_iter().collect(),
-                None => graph.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
-            })
-            .collect();
+        let mut departures: Vec<Vec<State>> = query.anchors.iter().map(|a| graph.departures(mask, a)).collect();
         let start = (0..departures.len()).min_by_key(|&i| departures[i].len());
         let Some(start) = start.filter(|&i| !departures[i].is_empty()) else { return Ok(None) };
         let SearchWorkspace { leg_starts, cost_to_go, forward, boundary, .. } = work;
@@ -245,8 +251,7 @@ impl<'a> AnchoredSearch<'a> {
             return Ok(());
         }
         let cost = |best: &Option<Route>| best.as_ref().map_or(f32::INFINITY, |r| r.cost);
-        let directed = self.departures.iter().all(|d| d.len() == 1);
-        let mut limit = least * if directed { ROUNDING } else { FIRST_LIMIT };
+        let mut limit = least * FIRST_LIMIT;
         while least < cost(best) {
             let below = limit.min(cost(best));
             let complete = self.compute_cost_to_go(below, least, budget)?;

@@ -10,7 +10,7 @@ use crate::surface::SurfacePoint;
 pub struct Anchor {
     /// The point on the design mesh.
     pub at: SurfacePoint,
-    /// The direction of the spine there, a vector in space of any length; `None`: any direction.
+    /// The direction of the spine there, a vector in space of any length, or its opposite; `None`: any direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<DVec3>,
 }

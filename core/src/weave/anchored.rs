@@ -8,7 +8,7 @@ use crate::elastica::{
     Anchor as VertexAnchor, AnchorQuery, Certainty, DirectionMask, FoundLoop, ProposalQuery, SearchWorkspace,
 };
 use crate::progress::{Cancelled, Progress};
-use crate::surface::Waypoint;
+use crate::surface::{SurfaceCurve, Waypoint};
 use crate::weave::anchor::Anchor;
 use crate::weave::design::{Strip, StripId};
 use crate::weave::error::{NoLoop, WeaveError};
@@ -23,7 +23,7 @@ const DIRECTION_REACH: f64 = 1.5;
 
 impl Session {
     /// Strips through all anchors in order, the cheapest first. `replaces` is a placed strip that is edited: it does not block
-    /// directions. `first` is called with the cheapest before its alternatives are found.
+    /// directions. `first` is called with the cheapest, smoothed, before its alternatives are found.
     ///
     /// # Errors
     ///
@@ -37,28 +37,47 @@ impl Session {
     ) -> Result<Vec<Proposal>, WeaveError> {
         let mask = self.mask_without(replaces)?;
         let mut work = std::mem::take(&mut self.recent.workspace);
-        let mut watch = |l: &FoundLoop| first(Proposal { anchors: anchors.to_vec(), ..Proposal::found(l) });
-        let mut found = self.loops_through(anchors, &mask, &mut work, progress, &mut watch);
-        if found.as_ref().is_ok_and(Vec::is_empty) {
-            // Where strips cover every direction, loops avoid the directions of their spines only.
-            let strips = &self.design().strips;
-            let spines = mask_spines(self.model(), strips, |i| Some(strips[i].id) != replaces);
-            found = self.loops_through(anchors, &spines, &mut work, progress, &mut watch);
-        }
+        let found = self.search_and_smooth(anchors, replaces, &mask, &mut work, progress, &mut first);
         self.recent.workspace = work;
-        let found = found?;
-        if found.is_empty() {
-            return Err(self.why_no_loop(anchors, replaces, progress)?.into());
+        match found? {
+            found if found.is_empty() => Err(self.why_no_loop(anchors, replaces, progress)?.into()),
+            found => Ok(found),
         }
-        let (graph, waypoints) = (&self.model().graph, self.waypoints(anchors));
-        let others = self.design().strips.iter().filter(|s| Some(s.id) != replaces).map(Strip::woven);
-        let contacts = LoopContacts::new(&self.model().mesh, &self.model().sharp, others);
-        let tie = self.model().options.relaxation_tie();
+    }
+
+    fn search_and_smooth(
+        &self,
+        anchors: &[Anchor],
+        replaces: Option<StripId>,
+        mask: &DirectionMask,
+        work: &mut SearchWorkspace,
+        progress: &Progress,
+        first: &mut dyn FnMut(Proposal),
+    ) -> Result<Vec<Proposal>, WeaveError> {
+        let (model, strips) = (self.model(), &self.design().strips);
+        let waypoints = self.waypoints(anchors);
+        let others = strips.iter().filter(|s| Some(s.id) != replaces).map(Strip::woven);
+        let contacts = LoopContacts::new(&model.mesh, &model.sharp, others);
         let smooth = |l: &FoundLoop| {
-            let smooth = smoothed_proposal(graph, &contacts, l, &waypoints, tie, progress)?;
-            Ok(Proposal { anchors: anchors.to_vec(), ..smooth })
+            let tie = model.options.relaxation_tie();
+            let smooth = smoothed_proposal(&model.graph, &contacts, l, &waypoints, tie, progress)?;
+            Ok::<_, WeaveError>(Proposal { anchors: anchors.to_vec(), ..smooth })
         };
-        found.par_iter().map(smooth).collect()
+        let mut best: Option<(SurfaceCurve, Proposal)> = None;
+        let mut watch = |l: &FoundLoop| {
+            if let Ok(proposal) = smooth(l) {
+                first(proposal.clone());
+                best = Some((l.curve.clone(), proposal));
+            }
+        };
+        let mut found = self.loops_through(anchors, mask, work, progress, &mut watch)?;
+        if found.is_empty() {
+            // Where strips cover every direction, loops avoid the directions of their spines only.
+            let spines = mask_spines(model, strips, |i| Some(strips[i].id) != replaces);
+            found = self.loops_through(anchors, &spines, work, progress, &mut watch)?;
+        }
+        let known = |l: &FoundLoop| best.as_ref().filter(|(curve, _)| *curve == l.curve).map(|(_, p)| p.clone());
+        found.par_iter().map(|l| known(l).map_or_else(|| smooth(l), Ok)).collect()
     }
 
     /// Puts a strip in the place of another one, as one step of the history; it keeps the number and the position in order.

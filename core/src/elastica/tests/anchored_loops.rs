@@ -24,13 +24,7 @@ fn loops_through_anchors_are_exact() {
         &[free(5), free(5)],
     ];
     for anchors in cases {
-        let departures: Vec<Vec<State>> = anchors
-            .iter()
-            .map(|a| match a.direction {
-                Some(d) => g.nearest_open(&mask, a.vertex, d).into_iter().collect(),
-                None => g.outgoing(a.vertex).collect(),
-            })
-            .collect();
+        let departures: Vec<Vec<State>> = anchors.iter().map(|a| g.departures(&mask, a)).collect();
         let expected = cheapest_round(&g, &mask, &departures);
         let query = AnchorQuery { budget: u64::MAX, ..AnchorQuery::cheapest(anchors, &mask) };
         let found = g.loops_through(&query, &mut work, &Progress::new(), |_| {}).unwrap();
@@ -40,6 +34,23 @@ fn loops_through_anchors_are_exact() {
         assert!(anchors.iter().all(|a| l.path.contains(&a.vertex)));
         assert_eq!(l.path[0], anchors[0].vertex);
         assert_eq!(l.curve.check(g.mesh()), Ok(()));
+    }
+}
+
+#[test]
+fn a_direction_and_its_opposite_mean_the_same_line() {
+    let g = graph(ellipsoid(3, DVec3::new(1.0, 0.7, 0.5)));
+    let mask = DirectionMask::all_open();
+    let mut work = SearchWorkspace::new();
+    let mut cost = |signs: [f64; 2]| {
+        let vertices = [VertexId(40), VertexId(200)];
+        let anchors = [0, 1].map(|i| Anchor { vertex: vertices[i], direction: Some(DVec3::X * signs[i]) });
+        let found = g.loops_through(&AnchorQuery::cheapest(&anchors, &mask), &mut work, &Progress::new(), |_| {});
+        found.unwrap().loops[0].cost
+    };
+    let expected = cost([1.0, 1.0]);
+    for signs in [[1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+        assert!((cost(signs) - expected).abs() < 1e-6 * expected, "{signs:?}");
     }
 }
 

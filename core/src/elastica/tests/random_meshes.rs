@@ -149,11 +149,7 @@ fn at_vertices(g: &ElasticaGraph, anchors: &[Choice]) -> Vec<Anchor> {
 
 /// The states by which a loop may leave each anchor.
 fn departures(g: &ElasticaGraph, mask: &DirectionMask, anchors: &[Anchor]) -> Vec<Vec<State>> {
-    let of = |a: &Anchor| match a.direction {
-        Some(d) => g.nearest_open(mask, a.vertex, d).into_iter().collect(),
-        None => g.outgoing(a.vertex).filter(|&e| mask.is_open(e)).collect(),
-    };
-    anchors.iter().map(of).collect()
+    anchors.iter().map(|a| g.departures(mask, a)).collect()
 }
 
 /// The cost of the loop found through anchors on an uneven torus, and that of the cheapest by plain Dijkstra.
